@@ -1,0 +1,324 @@
+"""The callbacks compiled to C functions: the same equations, no interpreter, no lock.
+
+Importing this module imports numba; ``install`` does so when the compiled back-end is asked for.
+Each call is a pure function of model and data, so they serve any number of threads.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import inspect
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import Any
+
+import llvmlite.binding as llvm
+import mujoco
+import numba
+
+from mjhill import elements, intrinsics, layout, scheme
+from mjhill.intrinsics import (
+    chained_act_bias,
+    chained_act_dyn,
+    chained_passive,
+    load_byte,
+    load_double,
+    load_int,
+    load_pointer,
+    read_delayed_control,
+    store_double,
+)
+from mjhill.layout import MUSCLE_TAG, NUSER_JNT, PASSIVE_TAG, SLOTS, STATES
+from mjhill.structs import mujoco_library, offset, verify
+
+_ROW = 8 * 10  # bytes of one actuator's dynprm, gainprm or biasprm
+_JIT = {"error_model": "numpy", "nogil": True}
+_RK4 = int(mujoco.mjtIntegrator.mjINT_RK4)
+_USER = int(mujoco.mjtDyn.mjDYN_USER)
+_SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
+_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+_CLAMP_DISABLED = int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
+_MAXVAL = float(mujoco.mjMAXVAL)
+
+
+@dataclass(frozen=True)
+class CompiledCallbacks:
+    """Addresses of the three C functions, and the table of those they pass on to."""
+
+    act_dyn: int
+    act_bias: int
+    passive: int
+    chain: Any  # ctypes array of three pointers
+    keep: tuple[Any, ...]  # what owns the machine code
+
+
+def _compile_equations(*modules: ModuleType) -> dict[str, Callable[..., Any]]:
+    """Every function of ``modules``, jitted, each calling the jitted others."""
+    namespace: dict[str, Any] = {"exp": math.exp, "log": math.log, "sqrt": math.sqrt}
+    for module in modules:
+        for name, function in inspect.getmembers(module, inspect.isfunction):
+            if function.__module__ == module.__name__:
+                bound = FunctionType(function.__code__, namespace, name)
+                namespace[name] = numba.njit(**_JIT)(bound)
+    return namespace
+
+
+_equations = _compile_equations(elements, scheme)
+muscle_rates = _equations["muscle_rates"]
+series_force = _equations["series_force"]
+passive_torque = _equations["passive_torque"]
+
+
+def _fingerprint() -> int:
+    """A number for all that the machine code depends on and numba's cache does not look at."""
+    digest = hashlib.sha256(f"{mujoco.__version__} {numba.__version__}".encode())
+    for module in (elements, scheme, layout, intrinsics):
+        digest.update(Path(inspect.getfile(module)).read_bytes())
+    return int.from_bytes(digest.digest()[:7], "big")
+
+
+def _slot(name: str) -> int:
+    return 8 * SLOTS[name][1]
+
+
+FIELDS = [
+    *(f"mjModel.opt.{name}" for name in ("timestep", "integrator", "disableflags")),
+    *(f"mjModel.actuator_{name}" for name in ("dyntype", "ctrladr", "outadr", "actadr", "actnum")),
+    *(f"mjModel.actuator_{name}" for name in ("dynprm", "gainprm", "biasprm", "length0")),
+    *(f"mjModel.actuator_{name}" for name in ("ctrllimited", "ctrlrange", "delay", "history")),
+    *(f"mjModel.{name}" for name in ("njnt", "nuser_jnt", "jnt_user", "jnt_type", "jnt_qposadr")),
+    *(f"mjModel.{name}" for name in ("jnt_dofadr", "dof_treeid", "qpos_spring")),
+    *(f"mjData.{name}" for name in ("time", "ctrl", "act", "act_dot", "qpos", "qfrc_passive")),
+    *(f"mjData.{name}" for name in ("actuator_length", "actuator_velocity", "tree_awake")),
+]
+
+
+def _cfunc(result: Any, arguments: tuple[Any, ...]) -> Callable[[Callable[..., Any]], Any]:
+    """``numba.cfunc`` that caches on disk where there is a place to."""
+
+    def compile_(function: Callable[..., Any]) -> Any:
+        signature = result(*arguments)
+        try:
+            return numba.cfunc(signature, cache=True, **_JIT)(function)
+        except RuntimeError as error:
+            if "no locator available" not in str(error):
+                raise
+            return numba.cfunc(signature, **_JIT)(function)
+
+    return compile_
+
+
+_ACTUATOR = (numba.float64, (numba.int64, numba.int64, numba.int32))
+_GENERIC = (numba.void, (numba.int64, numba.int64))
+
+
+def _make_control() -> Any:
+    """The input the engine would use, see ``python_callbacks.control``."""
+    m_ctrladr = offset("mjModel.actuator_ctrladr")
+    m_delay = offset("mjModel.actuator_delay")
+    m_history = offset("mjModel.actuator_history")
+    m_flags = offset("mjModel.opt.disableflags")
+    m_limited = offset("mjModel.actuator_ctrllimited")
+    m_range = offset("mjModel.actuator_ctrlrange")
+    d_time = offset("mjData.time")
+    d_ctrl = offset("mjData.ctrl")
+
+    @numba.njit(**_JIT)
+    def control(m: int, d: int, i: int) -> float:
+        ctrl = numba.int64(load_int(load_pointer(m + m_ctrladr) + 4 * i))
+        u = load_double(load_pointer(d + d_ctrl) + 8 * ctrl)
+        if load_double(load_pointer(m + m_delay) + 8 * i) != 0.0:
+            order = load_int(load_pointer(m + m_history) + 8 * i + 4)
+            u = read_delayed_control(m, d, numba.int32(i), load_double(d + d_time), order)
+        limited = load_byte(load_pointer(m + m_limited) + ctrl)
+        if limited and not load_int(m + m_flags) & _CLAMP_DISABLED:
+            bounds = load_pointer(m + m_range) + 16 * ctrl
+            u = min(max(u, load_double(bounds)), load_double(bounds + 8))
+        if not abs(u) <= _MAXVAL:
+            return 0.0
+        return min(max(u, 0.0), 1.0)
+
+    return control
+
+
+_key = _fingerprint()
+_control = _make_control()
+
+
+def _make_act_dyn(key: int) -> Any:
+    m_dynprm, m_gainprm = offset("mjModel.actuator_dynprm"), offset("mjModel.actuator_gainprm")
+    m_biasprm, m_actnum = offset("mjModel.actuator_biasprm"), offset("mjModel.actuator_actnum")
+    m_actadr, m_outadr = offset("mjModel.actuator_actadr"), offset("mjModel.actuator_outadr")
+    m_length0 = offset("mjModel.actuator_length0")
+    m_timestep, m_integrator = offset("mjModel.opt.timestep"), offset("mjModel.opt.integrator")
+    d_act, d_act_dot = offset("mjData.act"), offset("mjData.act_dot")
+    d_length, d_velocity = offset("mjData.actuator_length"), offset("mjData.actuator_velocity")
+    tau_nex, tau_act = _slot("excitation_tau"), _slot("activation_tau")
+    tau_deact, floor = _slot("deactivation_tau"), _slot("activation_floor")
+    stimulated = _slot("electrical_stimulation")
+    optimal, width_short, width_long = map(_slot, ("optimal_length", "width_short", "width_long"))
+    stretch_max, shape, limit = map(_slot, ("series_stretch", "series_shape", "series_limit"))
+    max_velocity, hill = _slot("max_velocity"), _slot("hill_shape")
+    plateau, slope_ratio = _slot("eccentric_plateau"), _slot("eccentric_slope_ratio")
+    viscosity, share = _slot("viscosity"), _slot("velocity_activation")
+
+    @_cfunc(*_ACTUATOR)
+    def act_dyn(m: int, d: int, actuator: int) -> float:
+        i = numba.int64(actuator)
+        dyn = load_pointer(m + m_dynprm) + _ROW * i
+        actnum = load_int(load_pointer(m + m_actnum) + 4 * i)
+        if load_double(dyn) != MUSCLE_TAG or actnum != STATES or d == key:
+            return chained_act_dyn(m, d, actuator)
+        gain = load_pointer(m + m_gainprm) + _ROW * i
+        bias = load_pointer(m + m_biasprm) + _ROW * i
+        out = 8 * numba.int64(load_int(load_pointer(m + m_outadr) + 4 * i))
+        first = 8 * numba.int64(load_int(load_pointer(m + m_actadr) + 4 * i))
+        act = load_pointer(d + d_act) + first
+        n_rate, a_rate, s_rate = muscle_rates(
+            load_int(m + m_integrator) == _RK4,
+            _control(m, d, i),
+            load_double(act),
+            load_double(act + 8),
+            load_double(act + 16),
+            load_double(load_pointer(d + d_length) + out)
+            - load_double(load_pointer(m + m_length0) + out),
+            load_double(load_pointer(d + d_velocity) + out),
+            load_double(m + m_timestep),
+            load_double(dyn + tau_nex),
+            load_double(dyn + tau_act),
+            load_double(dyn + tau_deact),
+            load_double(dyn + stimulated),
+            load_double(dyn + floor),
+            load_double(gain + optimal),
+            load_double(gain + width_short),
+            load_double(gain + width_long),
+            load_double(gain + stretch_max),
+            load_double(gain + shape),
+            load_double(gain + limit),
+            load_double(bias + max_velocity),
+            load_double(bias + hill),
+            load_double(bias + plateau),
+            load_double(bias + slope_ratio),
+            load_double(bias + viscosity),
+            load_double(bias + share),
+        )
+        act_dot = load_pointer(d + d_act_dot) + first
+        store_double(act_dot, n_rate)
+        store_double(act_dot + 8, a_rate)
+        store_double(act_dot + 16, s_rate)
+        return s_rate
+
+    return act_dyn
+
+
+def _make_act_bias(key: int) -> Any:
+    m_dyntype, m_dynprm = offset("mjModel.actuator_dyntype"), offset("mjModel.actuator_dynprm")
+    m_gainprm, m_actnum = offset("mjModel.actuator_gainprm"), offset("mjModel.actuator_actnum")
+    m_actadr, m_outadr = offset("mjModel.actuator_actadr"), offset("mjModel.actuator_outadr")
+    m_length0 = offset("mjModel.actuator_length0")
+    d_act, d_length = offset("mjData.act"), offset("mjData.actuator_length")
+    stretch_max, shape, limit = map(_slot, ("series_stretch", "series_shape", "series_limit"))
+    max_force = _slot("max_isometric_force")
+
+    @_cfunc(*_ACTUATOR)
+    def act_bias(m: int, d: int, actuator: int) -> float:
+        i = numba.int64(actuator)
+        tag = load_double(load_pointer(m + m_dynprm) + _ROW * i)
+        actnum = load_int(load_pointer(m + m_actnum) + 4 * i)
+        dyntype = load_int(load_pointer(m + m_dyntype) + 4 * i)
+        if tag != MUSCLE_TAG or actnum != STATES or dyntype != _USER or d == key:
+            return chained_act_bias(m, d, actuator)
+        gain = load_pointer(m + m_gainprm) + _ROW * i
+        out = 8 * numba.int64(load_int(load_pointer(m + m_outadr) + 4 * i))
+        first = 8 * numba.int64(load_int(load_pointer(m + m_actadr) + 4 * i))
+        length = load_double(load_pointer(d + d_length) + out) - load_double(
+            load_pointer(m + m_length0) + out
+        )
+        force, _ = series_force(
+            length - load_double(load_pointer(d + d_act) + first + 16),
+            load_double(gain + stretch_max),
+            load_double(gain + shape),
+            load_double(gain + limit),
+        )
+        # tension is positive in elements; MuJoCo's force is positive when it lengthens
+        return -force * load_double(gain + max_force)
+
+    return act_bias
+
+
+def _make_passive(key: int) -> Any:
+    m_njnt, m_nuser, m_user = map(
+        offset, ("mjModel.njnt", "mjModel.nuser_jnt", "mjModel.jnt_user")
+    )
+    m_type, m_qposadr = offset("mjModel.jnt_type"), offset("mjModel.jnt_qposadr")
+    m_dofadr, m_treeid = offset("mjModel.jnt_dofadr"), offset("mjModel.dof_treeid")
+    m_spring, d_awake = offset("mjModel.qpos_spring"), offset("mjData.tree_awake")
+    d_qpos, d_passive = offset("mjData.qpos"), offset("mjData.qfrc_passive")
+
+    @_cfunc(*_GENERIC)
+    def passive(m: int, d: int) -> None:
+        chained_passive(m, d)
+        nuser = load_pointer(m + m_nuser)
+        if nuser < NUSER_JNT or d == key:
+            return
+        for joint in range(load_pointer(m + m_njnt)):
+            user = load_pointer(m + m_user) + 8 * nuser * joint
+            kind = load_int(load_pointer(m + m_type) + 4 * joint)
+            if load_double(user) != PASSIVE_TAG or kind not in (_SLIDE, _HINGE):
+                continue
+            dof = numba.int64(load_int(load_pointer(m + m_dofadr) + 4 * joint))
+            tree = numba.int64(load_int(load_pointer(m + m_treeid) + 4 * dof))
+            if not load_int(load_pointer(d + d_awake) + 4 * tree):
+                continue  # MuJoCo does not clear qfrc_passive of a sleeping tree
+            position = 8 * numba.int64(load_int(load_pointer(m + m_qposadr) + 4 * joint))
+            rest = load_double(load_pointer(m + m_spring) + position)
+            total = load_pointer(d + d_passive) + 8 * dof
+            torque = passive_torque(
+                load_double(load_pointer(d + d_qpos) + position) - rest,
+                0.0,
+                load_double(user + 8),
+                load_double(user + 16),
+                load_double(user + 24),
+                load_double(user + 32),
+                load_double(user + 40),
+            )
+            store_double(total, load_double(total) + torque)
+
+    return passive
+
+
+def build() -> CompiledCallbacks:
+    """Compile the callbacks, or load them from numba's cache.
+
+    Raises:
+        RuntimeError: MuJoCo's structs are not laid out as its headers say.
+    """
+    _verify_structs()
+    chain = (ctypes.c_void_p * 3)()
+    llvm.add_symbol(intrinsics.CHAIN_SYMBOL, ctypes.addressof(chain))
+    read_control = ctypes.cast(mujoco_library().mj_readCtrl, ctypes.c_void_p).value
+    llvm.add_symbol("mj_readCtrl", read_control)
+    functions = (
+        _make_act_dyn(_key),
+        _make_act_bias(_key),
+        _make_passive(_key),
+    )
+    act_dyn, act_bias, passive = (function.address for function in functions)
+    return CompiledCallbacks(act_dyn, act_bias, passive, chain, functions)
+
+
+def _verify_structs() -> None:
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><option timestep="0.00123" integrator="implicitfast">
+          <flag clampctrl="disable"/></option><size nuser_jnt="7"/>
+        <worldbody><body><joint name="j" ref="0.1"/><geom size="0.1"/></body></worldbody>
+        <actuator><motor joint="j" delay="0.01" nsample="10"/>
+          <general joint="j" dyntype="filter"/></actuator></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    data.time = 0.5
+    verify(model, data, FIELDS)

@@ -1,0 +1,256 @@
+"""Callbacks put into MuJoCo, and everything put back as it was.
+
+MuJoCo's callbacks are process-wide. Ours are pure functions of model and data, so one
+installation serves every model and thread; actuators that are not ours, and passive forces, are
+passed on to what was installed before.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any, Literal, get_args
+
+import mujoco
+
+from mjhill import python_callbacks
+from mjhill.structs import mujoco_library
+
+Backend = Literal["compiled", "python"]
+
+_NAMES = ("act_dyn", "act_bias", "passive")
+_ACTUATOR = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
+_GENERIC = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+_TYPES: dict[str, Any] = {"act_dyn": _ACTUATOR, "act_bias": _ACTUATOR, "passive": _GENERIC}
+_lock = threading.RLock()
+
+
+@dataclass(frozen=True)
+class _Slot:
+    """What one callback held: the C pointer, and the object that MuJoCo's bindings hold for it."""
+
+    pointer: int | None
+    holder: Any
+
+    @property
+    def is_python(self) -> bool:
+        """Whether the callback is a Python function, reached through the bindings."""
+        return self.pointer is not None and callable(self.holder) and not isinstance(
+            self.holder, ctypes._CFuncPtr
+        )
+
+
+@dataclass(frozen=True)
+class _Installation:
+    backend: Backend
+    before: dict[str, _Slot]
+    ours: dict[str, int | None]
+
+
+_stack: list[_Installation] = []
+
+
+def install(backend: Backend = "compiled") -> None:
+    """Put the muscle's callbacks into MuJoCo, for every model of this process.
+
+    Load models first: with ``backend="python"``, MuJoCo cannot compile a model that has user
+    actuators while a Python callback is installed (google-deepmind/mujoco issue 1014);
+    ``mjhill.load`` takes care of that by itself.
+
+    Args:
+        backend: ``"compiled"`` (machine code, any number of threads) or ``"python"`` (plain
+            Python: slow, debuggable, single-threaded).
+
+    Raises:
+        ValueError: There is no such back-end.
+        RuntimeError: Another callback was put over an installation of ours, or MuJoCo's
+            structs are not laid out as its headers say.
+    """
+    if backend not in get_args(Backend):
+        known = " or ".join(map(repr, get_args(Backend)))
+        raise ValueError(f"backend must be {known}, got {backend!r}")
+    with _lock:
+        if _stack:
+            _check_still_ours(_stack[-1])
+        before = {name: _read(name) for name in _NAMES}
+        # what serves others is what stood there before our first installation
+        served = _stack[0].before if _stack else before
+        try:
+            (_put_compiled if backend == "compiled" else _put_python)(served)
+        except BaseException:
+            _restore(before)
+            raise
+        ours = {name: _read(name).pointer for name in _NAMES}
+        _stack.append(_Installation(backend, before, ours))
+
+
+def uninstall() -> None:
+    """Undo the last ``install``: each callback is again what it was before.
+
+    Raises:
+        RuntimeError: Nothing is installed, or a callback was replaced meanwhile; it is
+            restored even so.
+    """
+    with _lock:
+        if not _stack:
+            raise RuntimeError("mjhill is not installed; call mjhill.install() first")
+        installation = _stack.pop()
+        replaced = _replaced(installation)
+        _restore(installation.before)
+        if installation.backend == "compiled" and _stack:
+            _reinstate_chain()
+    if replaced:
+        raise RuntimeError(
+            f"{_listed(replaced)} replaced while mjhill was installed, and now removed; "
+            "install other callbacks before mjhill, which passes on to them"
+        )
+
+
+@contextmanager
+def installed(backend: Backend = "compiled") -> Iterator[None]:
+    """``install`` for the length of a ``with`` block, and exactly what was there after it.
+
+    Raises:
+        ValueError: There is no such back-end.
+        RuntimeError: As ``install`` and ``uninstall``.
+    """
+    install(backend)
+    try:
+        yield
+    except BaseException as error:
+        try:
+            uninstall()
+        except RuntimeError as second:
+            error.add_note(str(second))
+        raise
+    uninstall()
+
+
+def installed_backend() -> Backend | None:
+    """The back-end now in place, or None.
+
+    Raises:
+        RuntimeError: A callback was replaced since it was installed.
+    """
+    with _lock:
+        if not _stack:
+            return None
+        _check_still_ours(_stack[-1])
+        return _stack[-1].backend
+
+
+@contextmanager
+def without_python_callbacks() -> Iterator[None]:
+    """Take Python callbacks out while a model is compiled, which they would make fail."""
+    with _lock:
+        present = {name: _read(name) for name in _NAMES}
+        held = {name: slot for name, slot in present.items() if slot.is_python}
+        try:
+            for name in held:
+                _global(name).value = None
+            yield
+        finally:
+            for name, slot in held.items():
+                _global(name).value = slot.pointer
+
+
+def _put_compiled(served: dict[str, _Slot]) -> None:
+    compiled = _compiled()
+    for index, name in enumerate(_NAMES):
+        compiled.chain[index] = served[name].pointer
+        function = _TYPES[name](getattr(compiled, name))
+        if served[name].is_python:
+            # the bindings must go on holding the Python function that we pass on to
+            _global(name).value = getattr(compiled, name)
+        else:
+            getattr(mujoco, f"set_mjcb_{name}")(function)
+
+
+def _put_python(served: dict[str, _Slot]) -> None:
+    for name in _NAMES:
+        next_ = _callable(name, served[name])
+        if name == "passive":
+            function: Callable[..., Any] = partial(_passive, next_)
+        else:
+            function = partial(_actuator, getattr(python_callbacks, name), next_)
+        getattr(mujoco, f"set_mjcb_{name}")(function)
+
+
+def _actuator(
+    ours: Callable[..., float | None],
+    next_: Callable[..., float] | None,
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    actuator: int,
+) -> float:
+    result = ours(model, data, actuator)
+    if result is None:
+        return next_(model, data, actuator) if next_ else 0.0
+    return result
+
+
+def _passive(
+    next_: Callable[..., None] | None, model: mujoco.MjModel, data: mujoco.MjData
+) -> None:
+    if next_:
+        next_(model, data)
+    python_callbacks.passive(model, data)
+
+
+def _callable(name: str, slot: _Slot) -> Callable[..., Any] | None:
+    """What a slot held, as a Python function of model, data and, for actuators, the id."""
+    if slot.pointer is None:
+        return None
+    if slot.is_python:
+        return slot.holder  # type: ignore[no-any-return]
+    function = _TYPES[name](slot.pointer)
+    return lambda model, data, *actuator: function(model._address, data._address, *actuator)
+
+
+def _reinstate_chain() -> None:
+    """Point the compiled callbacks' chain at what stood before the first installation."""
+    for index, name in enumerate(_NAMES):
+        _compiled().chain[index] = _stack[0].before[name].pointer
+
+
+def _read(name: str) -> _Slot:
+    return _Slot(_global(name).value, getattr(mujoco, f"get_mjcb_{name}")())
+
+
+def _restore(slots: dict[str, _Slot]) -> None:
+    for name, slot in slots.items():
+        getattr(mujoco, f"set_mjcb_{name}")(slot.holder)
+        _global(name).value = slot.pointer
+
+
+def _replaced(installation: _Installation) -> list[str]:
+    return [name for name in _NAMES if _global(name).value != installation.ours[name]]
+
+
+def _check_still_ours(installation: _Installation) -> None:
+    replaced = _replaced(installation)
+    if replaced:
+        raise RuntimeError(
+            f"{_listed(replaced)} replaced since mjhill was installed; call mjhill.uninstall(), "
+            "which restores what was there before, and install the other callback first"
+        )
+
+
+def _listed(names: list[str]) -> str:
+    callbacks = ", ".join(f"mjcb_{name}" for name in names)
+    return f"{callbacks} {'was' if len(names) == 1 else 'were'}"
+
+
+def _global(name: str) -> ctypes.c_void_p:
+    return ctypes.c_void_p.in_dll(mujoco_library(), f"mjcb_{name}")
+
+
+@cache
+def _compiled() -> Any:
+    from mjhill.compiled_callbacks import build
+
+    return build()

@@ -1,0 +1,215 @@
+"""Where a muscle lives in MuJoCo: parameter slots, states, addresses. The one slot table.
+
+A muscle is ``<general dyntype="user" gaintype="fixed" biastype="user" actdim="3">``. Its states
+are ``act = [n, a, s]``; its parameters fill ``actuator_dynprm`` (excitation and activation),
+``actuator_gainprm`` (length) and ``actuator_biasprm`` (velocity). The exponential passive
+elasticity of a joint is in ``jnt_user``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjhill.parameters import Muscle, Passive
+
+MUSCLE_TAG = 198701.0  # dynprm[0] of a muscle with three states, slots as below
+PASSIVE_TAG = 198702.0  # jnt_user[0] of a joint with exponential passive elasticity
+STATES = 3  # n, a, s
+
+# parameter -> array and index; gainprm[0] is the gain of the fixed gain type and must be 0
+SLOTS: dict[str, tuple[str, int]] = {
+    "excitation_tau": ("dynprm", 1),
+    "activation_tau": ("dynprm", 2),
+    "deactivation_tau": ("dynprm", 3),
+    "electrical_stimulation": ("dynprm", 4),
+    "activation_floor": ("dynprm", 5),
+    "max_isometric_force": ("gainprm", 1),
+    "optimal_length": ("gainprm", 2),
+    "width_short": ("gainprm", 3),
+    "width_long": ("gainprm", 4),
+    "series_stretch": ("gainprm", 5),
+    "series_shape": ("gainprm", 6),
+    "series_limit": ("gainprm", 7),
+    "max_velocity": ("biasprm", 0),
+    "hill_shape": ("biasprm", 1),
+    "eccentric_plateau": ("biasprm", 2),
+    "eccentric_slope_ratio": ("biasprm", 3),
+    "viscosity": ("biasprm", 4),
+    "velocity_activation": ("biasprm", 5),
+}
+PASSIVE_SLOTS = ("k1_pos", "k2_pos", "k1_neg", "k2_neg", "exponent_limit")  # jnt_user[1:6]
+NUSER_JNT = 1 + len(PASSIVE_SLOTS)
+
+# the parameters of ``scheme.muscle_rates``, in its order
+RATE_PARAMETERS = (
+    "excitation_tau",
+    "activation_tau",
+    "deactivation_tau",
+    "electrical_stimulation",
+    "activation_floor",
+    "optimal_length",
+    "width_short",
+    "width_long",
+    "series_stretch",
+    "series_shape",
+    "series_limit",
+    "max_velocity",
+    "hill_shape",
+    "eccentric_plateau",
+    "eccentric_slope_ratio",
+    "viscosity",
+    "velocity_activation",
+)
+
+
+@dataclass(frozen=True)
+class Address:
+    """Where one muscle is in the model's and data's arrays.
+
+    Attributes:
+        actuator: Actuator id.
+        ctrl: Index into ``ctrl``.
+        act: Index of n in ``act``; a and s follow.
+        out: Index into ``actuator_length``, ``actuator_velocity`` and ``actuator_force``.
+    """
+
+    actuator: int
+    ctrl: int
+    act: int
+    out: int
+
+
+def is_muscle(model: mujoco.MjModel, actuator: int) -> bool:
+    """Whether the callbacks serve this actuator: a user actuator, tagged, of three states."""
+    return bool(
+        model.actuator_dyntype[actuator] == mujoco.mjtDyn.mjDYN_USER
+        and model.actuator_dynprm[actuator, 0] == MUSCLE_TAG
+        and model.actuator_actnum[actuator] == STATES
+    )
+
+
+def muscle_names(model: mujoco.MjModel) -> list[str]:
+    """Names of the muscles of a model, in the order of its actuators."""
+    return [model.actuator(i).name for i in range(model.nactuator) if is_muscle(model, i)]
+
+
+def address(model: mujoco.MjModel, name: str) -> Address:
+    """The addresses of a muscle.
+
+    Raises:
+        ValueError: No muscle has this name; the message lists those there are.
+    """
+    actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
+    if actuator < 0 or not is_muscle(model, actuator):
+        known = ", ".join(muscle_names(model)) or "none"
+        raise ValueError(f"unknown muscle {name!r}; the model's muscles are: {known}")
+    return Address(
+        actuator,
+        int(model.actuator_ctrladr[actuator]),
+        int(model.actuator_actadr[actuator]),
+        int(model.actuator_outadr[actuator]),
+    )
+
+
+def addresses(model: mujoco.MjModel) -> Iterator[tuple[str, Address]]:
+    """Name and addresses of each muscle of a model."""
+    for name in muscle_names(model):
+        yield name, address(model, name)
+
+
+def read_muscle(model: mujoco.MjModel, name: str) -> Muscle:
+    """The parameters of a muscle, from the model's arrays.
+
+    Raises:
+        ValueError: No muscle has this name, or a value is outside its bounds.
+    """
+    i = address(model, name).actuator
+    rows = {array: getattr(model, f"actuator_{array}")[i] for array in _ARRAYS}
+    values: dict[str, Any] = {
+        parameter: float(rows[array][slot]) for parameter, (array, slot) in SLOTS.items()
+    }
+    try:
+        return Muscle(**values)
+    except ValueError as error:
+        raise ValueError(f"muscle {name!r}: {error}") from None
+
+
+def write_muscle(model: mujoco.MjModel, name: str, muscle: Muscle) -> None:
+    """Write the parameters of a muscle into the model's arrays.
+
+    Raises:
+        ValueError: No muscle has this name.
+    """
+    i = address(model, name).actuator
+    for array, row in parameter_rows(muscle).items():
+        getattr(model, f"actuator_{array}")[i] = row
+
+
+def parameter_rows(muscle: Muscle) -> dict[str, np.ndarray]:
+    """The rows ``dynprm``, ``gainprm`` and ``biasprm`` of a muscle, shape (10,) each."""
+    rows = {array: np.zeros(10) for array in _ARRAYS}
+    rows["dynprm"][0] = MUSCLE_TAG
+    for parameter, (array, slot) in SLOTS.items():
+        rows[array][slot] = float(getattr(muscle, parameter))
+    return rows
+
+
+def has_passive(model: mujoco.MjModel, joint: int) -> bool:
+    """Whether a joint has exponential passive elasticity."""
+    return bool(model.nuser_jnt >= NUSER_JNT and model.jnt_user[joint, 0] == PASSIVE_TAG)
+
+
+def read_passive(model: mujoco.MjModel, name: str) -> Passive:
+    """The exponential passive elasticity of a joint, from the model's arrays.
+
+    Raises:
+        ValueError: No joint has this name, it has no passive elasticity of ours, or a value is
+            outside its bounds.
+    """
+    joint = joint_id(model, name)
+    if not has_passive(model, joint):
+        raise ValueError(
+            f"joint {name!r} has no mjhill passive elasticity; give it one with "
+            "mjhill.add_passive(spec, joint=..., passive=...)"
+        )
+    values = dict(zip(PASSIVE_SLOTS, model.jnt_user[joint, 1:].tolist(), strict=False))
+    try:
+        return Passive(**values)
+    except ValueError as error:
+        raise ValueError(f"joint {name!r}: {error}") from None
+
+
+def write_passive(model: mujoco.MjModel, name: str, passive: Passive) -> None:
+    """Write the exponential passive elasticity of a joint into the model's arrays.
+
+    Raises:
+        ValueError: No joint has this name, or it has no passive elasticity of ours.
+    """
+    read_passive(model, name)
+    model.jnt_user[joint_id(model, name), :NUSER_JNT] = passive_row(passive)
+
+
+def passive_row(passive: Passive) -> np.ndarray:
+    """The start of ``jnt_user`` that holds a passive elasticity, shape (6,)."""
+    return np.array([PASSIVE_TAG, *(getattr(passive, slot) for slot in PASSIVE_SLOTS)])
+
+
+def joint_id(model: mujoco.MjModel, name: str) -> int:
+    """The id of a joint.
+
+    Raises:
+        ValueError: No joint has this name; the message lists those there are.
+    """
+    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+    if joint < 0:
+        known = ", ".join(model.joint(i).name for i in range(model.njnt)) or "none"
+        raise ValueError(f"unknown joint {name!r}; the model's joints are: {known}")
+    return int(joint)
+
+
+_ARRAYS = ("dynprm", "gainprm", "biasprm")

@@ -1,0 +1,275 @@
+"""Parameters of muscles and joints: values, units, bounds and sources."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+_DATA = Path(__file__).parent / "data" / "joints.toml"
+_FORCE, _LENGTH = "N·m|N", "rad|m"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a parameter is: symbol, unit, meaning, bounds.
+
+    Attributes:
+        symbol: Its symbol in the equations.
+        unit: Its unit; ``a|b`` reads ``a`` on a joint, ``b`` on a tendon.
+        meaning: One phrase.
+        low: Lower bound.
+        high: Upper bound, allowed.
+        low_allowed: Whether the lower bound is itself allowed.
+    """
+
+    symbol: str
+    unit: str
+    meaning: str
+    low: float
+    high: float
+    low_allowed: bool = False
+
+    def check(self, name: str, value: float) -> None:
+        """Accept a value inside the bounds.
+
+        Raises:
+            ValueError: The value is not a finite number inside the bounds.
+        """
+        inside = self.low < value <= self.high or (self.low_allowed and value == self.low)
+        if not (isinstance(value, (int, float)) and math.isfinite(value) and inside):
+            bracket = "[" if self.low_allowed else "("
+            unit = "" if self.unit == "-" else f" {self.unit}"
+            wanted = f"{bracket}{self.low:g}, {self.high:g}]{unit}"
+            raise ValueError(f"{name} must be in {wanted}, got {value!r}")
+
+
+def _quantity(
+    symbol: str, unit: str, meaning: str, bounds: tuple[float, float], **options: Any
+) -> Any:
+    default = options.pop("default", MISSING)
+    quantity = Quantity(symbol, unit, meaning, *bounds, **options)
+    return field(default=default, metadata={"quantity": quantity})
+
+
+def quantities(cls: type) -> Iterator[tuple[str, Quantity]]:
+    """Name and description of each physical parameter of a parameter class, in order."""
+    for item in fields(cls):
+        if "quantity" in item.metadata:
+            yield item.name, item.metadata["quantity"]
+
+
+def _check_quantities(parameters: Any) -> None:
+    for name, quantity in quantities(type(parameters)):
+        quantity.check(name, getattr(parameters, name))
+        object.__setattr__(parameters, name, float(getattr(parameters, name)))
+
+
+def _sources() -> Any:
+    return field(default_factory=lambda: MappingProxyType({}), compare=False, repr=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Muscle:
+    """One muscle: neural excitation, activation, contractile and series element.
+
+    On a joint, force is a torque [N·m] and length an angle [rad]; on a tendon, force [N] and
+    length [m]. Lengths are MuJoCo's actuator length less its value at ``qpos0``: they grow as
+    the muscle is stretched. Equation numbers are those of Winters & Stark (1987).
+
+    Attributes:
+        sources: Where each value comes from, by parameter name.
+    """
+
+    max_isometric_force: float = _quantity(
+        "F_max", _FORCE, "isometric force at full activation and optimal length", (0, 1e6)
+    )
+    optimal_length: float = _quantity(
+        "L_opt", _LENGTH, "length at which active force is largest", (-100, 100), low_allowed=True
+    )
+    width_short: float = _quantity(
+        "w_short", _LENGTH, "Gaussian width of active force below the optimum", (0, 1000)
+    )
+    width_long: float = _quantity(
+        "w_long", _LENGTH, "Gaussian width of active force above the optimum", (0, 1000)
+    )
+    max_velocity: float = _quantity(
+        "V_max", f"({_LENGTH})/s", "shortening velocity without load (eq. 3)", (0, 1e4)
+    )
+    hill_shape: float = _quantity("A", "-", "Hill's a/F0, curvature of force-velocity (eq. 3)", (0, 10))
+    series_stretch: float = _quantity(
+        "x_max", _LENGTH, "stretch of the series element at F_max (eq. 7)", (0, 100)
+    )
+    series_shape: float = _quantity(
+        "S", "-", "shape of the exponential series element (eq. 7)", (0, 20), default=3.0
+    )
+    excitation_tau: float = _quantity("τ_nex", "s", "neural excitation, time constant (12)", (0, 1))
+    activation_tau: float = _quantity("τ_act", "s", "activation, time constant (12)", (0, 1))
+    deactivation_tau: float = _quantity("τ_deact", "s", "deactivation, time constant (12)", (0, 1))
+    eccentric_plateau: float = _quantity(
+        "P", "-", "force in fast lengthening, in units of isometric force", (1, 3), default=1.3
+    )
+    eccentric_slope_ratio: float = _quantity(
+        "R", "-", "slope of force-velocity just in lengthening over just in shortening",
+        (0, 20), default=1.0,
+    )  # fmt: skip
+    velocity_activation: float = _quantity(
+        "κ", "-", "share of V_max that scales with active state: V_max (1 - κ + κ a g)",
+        (0, 1), default=0.0, low_allowed=True,
+    )  # fmt: skip
+    viscosity: float = _quantity(
+        "β", "-", "viscosity beside the contractile element, in units of F_max/V_max",
+        (1e-6, 1), default=1e-3, low_allowed=True,
+    )  # fmt: skip
+    activation_floor: float = _quantity(
+        "a_min", "-", "least active state a g; keeps a relaxed muscle taut",
+        (1e-6, 0.1), default=1e-3, low_allowed=True,
+    )  # fmt: skip
+    series_limit: float = _quantity(
+        "r", "-", "stretch, in units of x_max, past which the series element goes on straight",
+        (1, 10), default=2.0, low_allowed=True,
+    )  # fmt: skip
+    electrical_stimulation: bool = False
+    sources: Mapping[str, str] = _sources()
+
+    def __post_init__(self) -> None:
+        """Check the bounds.
+
+        Raises:
+            ValueError: A parameter is not a finite number inside its bounds.
+        """
+        _check_quantities(self)
+        if self.electrical_stimulation not in (False, True):
+            raise ValueError(
+                f"electrical_stimulation must be False or True, got {self.electrical_stimulation!r}"
+            )
+        object.__setattr__(self, "electrical_stimulation", bool(self.electrical_stimulation))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Passive:
+    """Exponential passive elasticity of a joint beyond its linear stiffness.
+
+    Torque at deviation q from the rest angle: ``-sgn(q) k1 (exp(k2 |q|) - 1)``, with k1 and k2
+    of the side entered (Winters & Stark 1987, sect. 3.2: linear term plus exponential term).
+    On a slide joint, read force [N] and length [m].
+    """
+
+    k1_pos: float = _quantity("k1+", "N·m|N", "scale, positive side", (0, 1e6), low_allowed=True)
+    k2_pos: float = _quantity("k2+", "1/rad|1/m", "rate, positive side", (0, 1e4))
+    k1_neg: float = _quantity("k1-", "N·m|N", "scale, negative side", (0, 1e6), low_allowed=True)
+    k2_neg: float = _quantity("k2-", "1/rad|1/m", "rate, negative side", (0, 1e4))
+    exponent_limit: float = _quantity(
+        "z_max", "-", "k2 |q| past which the torque goes on straight", (1, 500), default=20.0
+    )
+    sources: Mapping[str, str] = _sources()
+
+    def __post_init__(self) -> None:
+        """Check the bounds.
+
+        Raises:
+            ValueError: A parameter is not a finite number inside its bounds.
+        """
+        _check_quantities(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Joint:
+    """A joint of the paper: passive plant and an antagonistic pair of muscles.
+
+    Attributes:
+        name: Name of the joint and of its model.
+        positive: The movement that raises the angle, such as ``flexion``.
+        range: Anatomical range of motion [rad]; not a stop.
+        home_angle: Angle of the ``home`` pose [rad].
+        muscles: Muscles by name, the one that pulls towards positive angles first.
+        gears: Actuator gear of each muscle: length = gear * angle.
+        sources: Where each value comes from, by parameter name.
+    """
+
+    name: str
+    positive: str
+    inertia: float = _quantity("J", "kg·m²", "moment of inertia", (0, 1e4))
+    damping: float = _quantity("B", "N·m·s/rad", "passive viscosity", (0, 1e4), low_allowed=True)
+    stiffness: float = _quantity(
+        "k_lin", "N·m/rad", "linear passive stiffness", (0, 1e6), low_allowed=True
+    )
+    rest_angle: float = _quantity(
+        "θ_rest", "rad", "angle of no passive torque", (-10, 10), low_allowed=True
+    )
+    passive: Passive
+    range: tuple[float, float]
+    home_angle: float
+    muscles: Mapping[str, Muscle]
+    gears: Mapping[str, float]
+    sources: Mapping[str, str] = _sources()
+
+    def __post_init__(self) -> None:
+        """Check the bounds.
+
+        Raises:
+            ValueError: A parameter is not a finite number inside its bounds.
+        """
+        _check_quantities(self)
+        if set(self.muscles) != set(self.gears):
+            raise ValueError(
+                f"gears must name the muscles {sorted(self.muscles)}, got {sorted(self.gears)}"
+            )
+
+
+class _Joints(Mapping[str, Joint]):
+    """The joints of ``data/joints.toml``, read on first use."""
+
+    def __getitem__(self, name: str) -> Joint:
+        if name not in _table():
+            raise KeyError(f"unknown joint {name!r}; there are: {', '.join(_table())}")
+        return _joint(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_table())
+
+    def __len__(self) -> int:
+        return len(_table())
+
+
+JOINTS: Mapping[str, Joint] = _Joints()
+
+
+@cache
+def _table() -> dict[str, Any]:
+    return tomllib.loads(_DATA.read_text(encoding="utf-8"))
+
+
+@cache
+def _joint(name: str) -> Joint:
+    table = dict(_table()[name])
+    passive = Passive(**_split(table.pop("passive")))
+    muscles, gears = {}, {}
+    for muscle_name, muscle_table in table.pop("muscles").items():
+        values = _split(muscle_table)
+        gears[muscle_name] = values.pop("gear")
+        muscles[muscle_name] = Muscle(**values)
+    values = _split(table)
+    values["range"] = tuple(values["range"])
+    return Joint(
+        name=name,
+        passive=passive,
+        muscles=MappingProxyType(muscles),
+        gears=MappingProxyType(gears),
+        **values,
+    )
+
+
+def _split(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Constructor arguments from entries ``name = {value = ..., source = ...}``."""
+    values, sources = {}, {}
+    for name, entry in table.items():
+        values[name] = entry["value"] if isinstance(entry, dict) else entry
+        if isinstance(entry, dict):
+            sources[name] = entry["source"]
+    return {**values, "sources": MappingProxyType(sources)}

@@ -1,0 +1,107 @@
+"""Byte offsets of MuJoCo's C structs, from its own declarations, checked against memory."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+from typing import Any
+
+import mujoco
+import numpy as np
+
+_SCALARS = {
+    "mjtNum": ctypes.c_double,
+    "float": ctypes.c_float,
+    "int": ctypes.c_int,
+    "mjtSize": ctypes.c_int64,
+    "size_t": ctypes.c_size_t,
+    "uintptr_t": ctypes.c_size_t,
+    "uint64_t": ctypes.c_uint64,
+    "mjtBool": ctypes.c_bool,
+    "mjtByte": ctypes.c_ubyte,
+    "char": ctypes.c_char,
+}
+
+
+@cache
+def mujoco_library() -> ctypes.CDLL:
+    """The MuJoCo library that the Python package has loaded."""
+    from mujoco import _functions
+
+    return ctypes.CDLL(_functions.__file__)
+
+
+@cache
+def offset(path: str) -> int:
+    """Byte offset of a field such as ``mjModel.opt.timestep`` from the start of its struct.
+
+    Raises:
+        RuntimeError: This MuJoCo has no such field, or one of a type unknown to us.
+    """
+    struct, *names = path.split(".")
+    kind, total = _struct(struct), 0
+    for name in names:
+        field = getattr(kind, name, None)
+        if field is None:
+            raise RuntimeError(f"MuJoCo {mujoco.__version__} has no {path}; mjhill needs MuJoCo 4.x")
+        total += field.offset
+        kind = dict(kind._fields_)[name]
+    return total
+
+
+@cache
+def _struct(name: str) -> Any:
+    from mujoco.introspect.structs import STRUCTS
+
+    return type(name, (ctypes.Structure,), {"_fields_": _members(STRUCTS[name].fields)})
+
+
+def _members(fields: Any) -> list[tuple[str, Any]]:
+    return [(field.name, _ctype(getattr(field, "type", field))) for field in fields]
+
+
+def _ctype(declared: Any) -> Any:
+    """The ctypes type of a declaration of ``mujoco.introspect``."""
+    kind = type(declared).__name__
+    if kind == "PointerType":
+        return ctypes.c_void_p
+    if kind == "ArrayType":
+        inner = _ctype(declared.inner_type)
+        for extent in reversed(declared.extents):
+            inner = inner * extent
+        return inner
+    if kind == "AnonymousStructDecl":
+        return type("anonymous", (ctypes.Structure,), {"_fields_": _members(declared.fields)})
+    if declared.name in _SCALARS:
+        return _SCALARS[declared.name]
+    if declared.name.startswith("mjt"):
+        return ctypes.c_int  # an enum
+    return _struct(declared.name)
+
+
+def verify(model: mujoco.MjModel, data: mujoco.MjData, paths: list[str]) -> None:
+    """Check offsets against a model and its data.
+
+    Pointers must be those of the bound arrays, scalars must read as the bound values.
+
+    Raises:
+        RuntimeError: A field is not where it was computed to be; nothing may be read by it.
+    """
+    for path in paths:
+        struct, *names = path.split(".")
+        owner: Any = {"mjModel": model, "mjData": data}[struct]
+        start = owner._address + offset(path)
+        bound = owner
+        for name in names:
+            bound = getattr(bound, name)
+        if isinstance(bound, np.ndarray):
+            found = ctypes.c_void_p.from_address(start).value
+            good = bound.size == 0 or found == bound.ctypes.data
+        else:
+            kind = ctypes.c_double if isinstance(bound, float) else ctypes.c_int
+            good = kind.from_address(start).value == bound
+        if not good:
+            raise RuntimeError(
+                f"MuJoCo {mujoco.__version__} keeps {path} elsewhere than its headers say; "
+                'the compiled muscle cannot run: use backend="python" and report this'
+            )
