@@ -1,3 +1,31 @@
 """Physiological muscle for MuJoCo: the Hill-based system of Winters & Stark (1987)."""
 
+from mjhill.checks import check_model as check_model
+from mjhill import reference as reference
+from mjhill.equilibrium import equilibrate as equilibrate
 from mjhill.install import install as install
+from mjhill.install import installed as installed
+from mjhill.install import installed_backend as installed_backend
+from mjhill.install import uninstall as uninstall
+from mjhill.layout import muscle_names as muscle_names
+from mjhill.layout import read_muscle as read_muscle
+from mjhill.layout import read_passive as read_passive
+from mjhill.layout import write_muscle as write_muscle
+from mjhill.layout import write_passive as write_passive
+from mjhill.models import load as load
+from mjhill.models import model_path as model_path
+from mjhill.parameters import JOINTS as JOINTS
+from mjhill.parameters import Joint as Joint
+from mjhill.parameters import Muscle as Muscle
+from mjhill.parameters import Passive as Passive
+from mjhill.recording import Recording as Recording
+from mjhill.run import record as record
+from mjhill.signals import Signal as Signal
+from mjhill.signals import constant as constant
+from mjhill.signals import pulse as pulse
+from mjhill.signals import sinusoid as sinusoid
+from mjhill.signals import step as step
+from mjhill.spec import add_muscle as add_muscle
+from mjhill.spec import add_passive as add_passive
+
+__version__ = "0.1.0"

@@ -1,0 +1,32 @@
+"""Steady muscle states for a pose and its controls."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+
+from mjhill.layout import addresses, read_muscle
+from mjhill.python_callbacks import control
+from mjhill.readings import steady_stretch
+
+
+def equilibrate(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Set every muscle's states to their steady values for the present pose and controls.
+
+    n and a become the control; s becomes the contractile length at which contractile and series
+    element carry the same force at rest. The pose stays: the joint need not be in balance.
+
+    Raises:
+        ValueError: A control or a position is not finite.
+    """
+    for what in ("ctrl", "qpos"):
+        for index, value in enumerate(getattr(data, what).tolist()):
+            if not math.isfinite(value):
+                raise ValueError(f"data.{what}[{index}] must be finite, got {value}")
+    mujoco.mj_fwdPosition(model, data)
+    for name, address in addresses(model):
+        u = control(model, data, address.actuator)
+        length = float(data.actuator_length[address.out] - model.actuator_length0[address.out])
+        stretch = steady_stretch(read_muscle(model, name), u, length)
+        data.act[address.act : address.act + 3] = u, u, length - stretch

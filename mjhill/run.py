@@ -1,0 +1,230 @@
+"""A model driven by inputs over time, recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjhill.checks import check_model
+from mjhill.install import installed_backend
+from mjhill.layout import address, is_muscle, joint_id, read_muscle
+from mjhill.python_callbacks import control
+from mjhill.readings import shortening_velocity, tension
+from mjhill.recording import Recording
+from mjhill.signals import Signal, as_signals
+
+_Reader = Callable[[mujoco.MjData], float]
+_COORDINATES = {  # joint type: position and velocity coordinates and their units
+    int(mujoco.mjtJoint.mjJNT_HINGE): (("angle", "rad"), ("velocity", "rad/s")),
+    int(mujoco.mjtJoint.mjJNT_SLIDE): (("position", "m"), ("velocity", "m/s")),
+}
+_EFFORT = {int(mujoco.mjtJoint.mjJNT_HINGE): "N·m", int(mujoco.mjtJoint.mjJNT_SLIDE): "N"}
+
+
+def record(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    *,
+    duration: float,
+    excitation: Mapping[str, Signal | float] | None = None,
+    torque: Mapping[str, Signal | float] | None = None,
+    every: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """Step a model from its present state and record it.
+
+    Over each step, an input is held at its value of mid-step. Series are named
+    ``<joint>.angle``, ``<joint>.velocity`` (``position`` for a slide, ``qpos0``... for others),
+    ``<joint>.applied`` where a torque is given, and for each muscle ``u``, ``n``, ``a``,
+    ``velocity`` (of the contractile element, shortening positive), ``stretch`` (of the series
+    element) and ``force`` (tension positive). A native MuJoCo muscle has ``u``, ``a``, ``force``.
+
+    Args:
+        model: The model.
+        data: Its state, advanced in place by ``duration``.
+        duration: Length of the run [s].
+        excitation: Neural input by actuator name; controls not named stay as they are.
+        torque: External torque [N·m] or force [N] by joint name.
+        every: Record every that many steps.
+        progress: Called now and then with the share done, 0 to 1.
+
+    Raises:
+        ValueError: A name is unknown, an input is not finite, a number is out of range, or the
+            model is not in order; see ``check_model``.
+        RuntimeError: Callbacks are not installed though the model has muscles, or MuJoCo
+            warned: it resets a state that went bad and goes on, so what follows is no run.
+    """
+    check_model(model)
+    if not (np.isfinite(duration) and duration > 0):
+        raise ValueError(f"duration must be positive, got {duration} s")
+    if every < 1:
+        raise ValueError(f"every must be at least 1 step, got {every}")
+    _require_callbacks(model)
+    actuators = [model.actuator(i).name for i in range(model.nactuator)]
+    inputs = as_signals(excitation or {}, actuators, "actuator")
+    loads = as_signals(torque or {}, _scalar_joints(model), "hinge or slide joint")
+    apply = _inputs(model, inputs, loads)
+    timestep = float(model.opt.timestep)
+    steps = round(duration / timestep)
+    readers = _readers(model, list(loads))
+    table = np.empty((steps // every + 1, len(readers) + 1))
+    for step in range(steps + 1):
+        apply(data, data.time + 0.5 * timestep)
+        if step % every == 0:
+            _refresh(model, data)
+            table[step // every] = [data.time, *(read(data) for _, _, read in readers)]
+        if step < steps:
+            mujoco.mj_step(model, data)
+            _check_warnings(data)
+        if progress is not None and step % 256 == 0:
+            progress(step / steps)
+    columns = np.ascontiguousarray(table.T)
+    names = [name for name, _, _ in readers]
+    units = {name: unit for name, unit, _ in readers}
+    return Recording(columns[0], dict(zip(names, columns[1:], strict=True)), units, _about(model))
+
+
+def _require_callbacks(model: mujoco.MjModel) -> None:
+    has_muscles = any(is_muscle(model, i) for i in range(model.nactuator))
+    if has_muscles and installed_backend() is None:
+        raise RuntimeError(
+            "the model has mjhill muscles but no callbacks are installed, so they would stay "
+            "limp; run inside `with mjhill.installed():`"
+        )
+
+
+def _inputs(
+    model: mujoco.MjModel, inputs: Mapping[str, Signal], loads: Mapping[str, Signal]
+) -> Callable[[mujoco.MjData, float], None]:
+    """A function that writes the inputs of a time into data."""
+    controls = [
+        (int(model.actuator_ctrladr[model.actuator(name).id]), name, s)
+        for name, s in inputs.items()
+    ]
+    dofs = [(int(model.jnt_dofadr[joint_id(model, name)]), name, s) for name, s in loads.items()]
+
+    def apply(data: mujoco.MjData, time: float) -> None:
+        for array, targets in ((data.ctrl, controls), (data.qfrc_applied, dofs)):
+            for index, name, signal in targets:
+                value = signal(time)
+                if not np.isfinite(value):
+                    raise ValueError(f"input of {name!r} at {time:g} s must be finite, got {value}")
+                array[index] = value
+
+    return apply
+
+
+def _scalar_joints(model: mujoco.MjModel) -> list[str]:
+    return [model.joint(i).name for i in range(model.njnt) if int(model.jnt_type[i]) in _EFFORT]
+
+
+def _readers(model: mujoco.MjModel, loads: list[str]) -> list[tuple[str, str, _Reader]]:
+    """Name, unit and reader of each series."""
+    readers: list[tuple[str, str, _Reader]] = []
+    for joint in range(model.njnt):
+        readers += _joint_readers(model, joint)
+    for name in loads:
+        joint = joint_id(model, name)
+        dof = int(model.jnt_dofadr[joint])
+        unit = _EFFORT[int(model.jnt_type[joint])]
+        readers.append((f"{name}.applied", unit, _item("qfrc_applied", dof)))
+    for actuator in range(model.nactuator):
+        if is_muscle(model, actuator):
+            readers += _muscle_readers(model, actuator)
+        elif model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_MUSCLE:
+            readers += _native_readers(model, actuator)
+    return readers
+
+
+def _item(array: str, index: int, sign: float = 1.0) -> _Reader:
+    return lambda data: sign * float(getattr(data, array)[index])
+
+
+def _joint_readers(model: mujoco.MjModel, joint: int) -> list[tuple[str, str, _Reader]]:
+    name = model.joint(joint).name or f"joint{joint}"
+    position, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+    kind = int(model.jnt_type[joint])
+    if kind in _COORDINATES:
+        (coordinate, unit), (rate, rate_unit) = _COORDINATES[kind]
+        return [
+            (f"{name}.{coordinate}", unit, _item("qpos", position)),
+            (f"{name}.{rate}", rate_unit, _item("qvel", dof)),
+        ]
+    free = kind == mujoco.mjtJoint.mjJNT_FREE
+    counts = (("qpos", position, 7 if free else 4), ("qvel", dof, 6 if free else 3))
+    return [
+        (f"{name}.{array}{k}", "MuJoCo", _item(array, first + k))
+        for array, first, count in counts
+        for k in range(count)
+    ]
+
+
+def _muscle_readers(model: mujoco.MjModel, actuator: int) -> list[tuple[str, str, _Reader]]:
+    name = model.actuator(actuator).name
+    muscle, at = read_muscle(model, name), address(model, name)
+    effort, length_unit = _muscle_units(model, actuator)
+
+    def length(data: mujoco.MjData) -> float:
+        return float(data.actuator_length[at.out] - model.actuator_length0[at.out])
+
+    def stretch(data: mujoco.MjData) -> float:
+        return length(data) - float(data.act[at.act + 2])
+
+    def velocity(data: mujoco.MjData) -> float:
+        return shortening_velocity(muscle, float(data.act[at.act + 1]), length(data), stretch(data))
+
+    return [
+        (f"{name}.u", "-", lambda data: control(model, data, actuator)),
+        (f"{name}.n", "-", _item("act", at.act)),
+        (f"{name}.a", "-", _item("act", at.act + 1)),
+        (f"{name}.velocity", f"{length_unit}/s", velocity),
+        (f"{name}.stretch", length_unit, stretch),
+        (f"{name}.force", effort, lambda data: tension(muscle, stretch(data))),
+    ]
+
+
+def _native_readers(model: mujoco.MjModel, actuator: int) -> list[tuple[str, str, _Reader]]:
+    name = model.actuator(actuator).name
+    effort, _ = _muscle_units(model, actuator)
+    return [
+        (f"{name}.u", "-", _item("ctrl", int(model.actuator_ctrladr[actuator]))),
+        (f"{name}.a", "-", _item("act", int(model.actuator_actadr[actuator]))),
+        (f"{name}.force", effort, _item("actuator_force", int(model.actuator_outadr[actuator]), -1)),
+    ]
+
+
+def _muscle_units(model: mujoco.MjModel, actuator: int) -> tuple[str, str]:
+    joint = model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_JOINT
+    hinge = joint and model.jnt_type[model.actuator_trnid[actuator, 0]] == (
+        mujoco.mjtJoint.mjJNT_HINGE
+    )
+    return ("N·m", "rad") if hinge else ("N", "m")
+
+
+def _refresh(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Lengths and forces of the state about to be stepped from."""
+    mujoco.mj_forward(model, data)
+
+
+def _check_warnings(data: mujoco.MjData) -> None:
+    for index, warning in enumerate(data.warning):
+        if warning.number:
+            name = mujoco.mjtWarning(index).name.removeprefix("mjWARN_").lower()
+            raise RuntimeError(
+                f"MuJoCo warned '{name}' {warning.number} times by {data.time:g} s (last at index "
+                f"{warning.lastinfo}); lower the timestep or look for a bad input"
+            )
+
+
+def _about(model: mujoco.MjModel) -> dict[str, Any]:
+    return {
+        "model": model.names.split(b"\0", 1)[0].decode(),
+        "timestep": float(model.opt.timestep),
+        "integrator": mujoco.mjtIntegrator(int(model.opt.integrator)).name,
+        "backend": installed_backend() or "none",
+        "mujoco": mujoco.__version__,
+    }
+
