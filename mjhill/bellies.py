@@ -26,7 +26,7 @@ MUSCLE_COLOURS: tuple[Colour, ...] = (
     (0.34, 0.71, 0.91),
     (0.45, 0.45, 0.45),
 )
-_ACTIVATION_COLOURS = np.array([[0.29, 0.31, 0.45], [0.66, 0.22, 0.34], [0.98, 0.07, 0.06]])
+_ACTIVATION_COLOURS = np.array([[0.33, 0.35, 0.48], [0.62, 0.24, 0.34], [0.86, 0.07, 0.06]])
 
 # of the tendon's length in qpos0; chosen by eye
 _STRAND_RADIUS = 0.013
@@ -210,7 +210,9 @@ def add_shape(scene: Any, shape: Shape, rgb: Any, emission: float) -> None:
     rgba = np.array([*rgb, 1.0], dtype=np.float32)
     chord = shape.end - shape.start
     half = float(np.linalg.norm(chord)) / 2
-    size = np.array([shape.radius, shape.radius, half])
+    # a capsule's size is radius and half length, an ellipsoid's its three half axes
+    capsule = shape.kind == mujoco.mjtGeom.mjGEOM_CAPSULE
+    size = np.array([shape.radius, half if capsule else shape.radius, half])
     middle = (shape.start + shape.end) / 2
     mujoco.mjv_initGeom(geom, shape.kind, size, middle, _frame(chord).ravel(), rgba)
     geom.emission, geom.specular, geom.shininess = emission, 0.3, 0.4

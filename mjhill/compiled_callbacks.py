@@ -36,7 +36,7 @@ from mjhill.layout import MUSCLE_TAG, NUSER_JNT, PASSIVE_TAG, SLOTS, STATES
 from mjhill.structs import mujoco_library, offset, verify
 
 _ROW = 8 * 10  # bytes of one actuator's dynprm, gainprm or biasprm
-_JIT = {"error_model": "numpy", "nogil": True}
+_JIT = {"error_model": "numpy", "nogil": True, "forceinline": True, "fastmath": {"contract", "arcp", "nsz"}}
 _RK4 = int(mujoco.mjtIntegrator.mjINT_RK4)
 _USER = int(mujoco.mjtDyn.mjDYN_USER)
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)

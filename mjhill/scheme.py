@@ -61,19 +61,20 @@ def advance_stretch(
     shape: float,
     limit: float,
     dt: float,
+    substeps: int,
 ) -> float:
     """Stretch of the series element after dt [s] at constant length rate and active state.
 
-    Exponential Rosenbrock-Euler in two substeps: one is enough at 1 ms, a second takes all
-    there is to take at 5 ms (the rest is MuJoCo's own half step).
+    Exponential Rosenbrock-Euler.
     """
-    for _ in range(2):
+    part = dt / substeps
+    for _ in range(substeps):
         force, stiffness = series_force(stretch, stretch_max, shape, limit)
         velocity, slope = contractile_velocity(
             force, hypothetical, hill, plateau, slope_ratio, viscosity
         )
-        z = 0.5 * dt * max_velocity * slope * stiffness
-        stretch += 0.5 * dt * (length_rate + max_velocity * velocity) * relaxed(z)
+        z = part * max_velocity * slope * stiffness
+        stretch += part * (length_rate + max_velocity * velocity) * relaxed(z)
     return stretch
 
 
@@ -156,9 +157,12 @@ def muscle_rates(
             viscosity, stretch_max, shape, limit, dt,
         )  # fmt: skip
     else:
+        # short steps need one; in long ones a second takes what there is to take, and what is
+        # left is MuJoCo's own half step
+        substeps = 2 if dt > 0.2 * tau_act else 1
         stretch_next = advance_stretch(
             stretch, length_rate, hypothetical, speed, hill, plateau, slope_ratio,
-            viscosity, stretch_max, shape, limit, dt,
+            viscosity, stretch_max, shape, limit, dt, substeps,
         )  # fmt: skip
         stretch_rate = (stretch_next - stretch) / dt
     return n_rate, a_rate, length_rate - stretch_rate

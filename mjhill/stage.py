@@ -76,9 +76,9 @@ class Stage:
         red = activation_colour(activation)
         for shape in muscle_shapes(self.model, self.data, muscle, force):
             if shape.belly:
-                add_shape(self._scene, shape, red, 0.1 + 0.3 * min(max(activation, 0.0), 1.0))
+                add_shape(self._scene, shape, red, 0.05 + 0.1 * min(max(activation, 0.0), 1.0))
             else:
-                add_shape(self._scene, shape, muscle.colour, 0.1)
+                add_shape(self._scene, shape, muscle.colour, 0.05)
 
 
 @contextmanager
