@@ -48,7 +48,7 @@ class _Slot:
 class _Installation:
     backend: Backend
     before: dict[str, _Slot]
-    ours: dict[str, int | None]
+    ours: dict[str, _Slot]
 
 
 _stack: list[_Installation] = []
@@ -84,7 +84,7 @@ def install(backend: Backend = "compiled") -> None:
         except BaseException:
             _restore(before)
             raise
-        ours = {name: _read(name).pointer for name in _NAMES}
+        ours = {name: _read(name) for name in _NAMES}
         _stack.append(_Installation(backend, before, ours))
 
 
@@ -228,7 +228,17 @@ def _restore(slots: dict[str, _Slot]) -> None:
 
 
 def _replaced(installation: _Installation) -> list[str]:
-    return [name for name in _NAMES if _global(name).value != installation.ours[name]]
+    """Callbacks that are no longer those we installed.
+
+    All Python callbacks share one C pointer, so there the function itself is compared.
+    """
+    now = {name: _read(name) for name in _NAMES}
+    return [
+        name
+        for name, slot in installation.ours.items()
+        if now[name].pointer != slot.pointer
+        or (slot.is_python and now[name].holder is not slot.holder)
+    ]
 
 
 def _check_still_ours(installation: _Installation) -> None:

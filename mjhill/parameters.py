@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from functools import cache
+from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -41,8 +42,10 @@ class Quantity:
         Raises:
             ValueError: The value is not a finite number inside the bounds.
         """
-        inside = self.low < value <= self.high or (self.low_allowed and value == self.low)
-        if not (isinstance(value, (int, float)) and math.isfinite(value) and inside):
+        if not isinstance(value, Real):
+            raise ValueError(f"{name} must be a number, got {value!r}")
+        above = self.low <= value if self.low_allowed else self.low < value
+        if not (math.isfinite(value) and above and value <= self.high):
             bracket = "[" if self.low_allowed else "("
             unit = "" if self.unit == "-" else f" {self.unit}"
             wanted = f"{bracket}{self.low:g}, {self.high:g}]{unit}"

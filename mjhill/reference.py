@@ -60,8 +60,7 @@ def simulate(
     inputs = {name: inputs.get(name, as_signal(0.0)) for name in joint.muscles}
     load = as_signal(torque)
     times = np.arange(round(duration / sample) + 1) * sample
-    breaks = {time for signal in (*inputs.values(), load) for time in signal.breaks}
-    knots = [0.0, *sorted(time for time in breaks if 0 < time < times[-1]), times[-1]]
+    knots = _knots([*inputs.values(), load], float(times[-1]))
     state = rest_state(joint) if start is None else np.array(start, dtype=np.float64)
     states = np.empty((len(times), len(state)))
     states[0] = state
@@ -133,6 +132,15 @@ def plant_torque(joint: Joint, angle: float) -> float:
         passive.k2_neg,
         passive.exponent_limit,
     )
+
+
+def _knots(signals: list[Signal], end: float) -> list[float]:
+    """Times of restart: 0, every jump inside the run, its end; sums of inputs may repeat one."""
+    knots = [0.0]
+    for time in sorted(time for signal in signals for time in signal.breaks):
+        if knots[-1] + 1e-9 < time < end - 1e-9:
+            knots.append(time)
+    return [*knots, end]
 
 
 def _solve(

@@ -1,0 +1,78 @@
+import dataclasses
+
+import mujoco
+import pytest
+from conftest import PAIR_XML
+
+import mjhill
+from mjhill.layout import RATE_PARAMETERS, SLOTS
+
+
+def test_a_muscle_is_read_back_as_it_was_added(pair, elbow):
+    for name, muscle in elbow.muscles.items():
+        assert mjhill.read_muscle(pair, name) == muscle
+
+
+def test_a_written_muscle_is_read_back_whole(pair, muscle):
+    values = {name: 0.0123 * k for k, name in enumerate(SLOTS, 2)}
+    values |= {"electrical_stimulation": True, "eccentric_plateau": 1.4, "series_limit": 3.0}
+    changed = dataclasses.replace(muscle, **values)
+    mjhill.write_muscle(pair, "elbow_extensor", changed)
+    assert mjhill.read_muscle(pair, "elbow_extensor") == changed
+    assert mjhill.read_muscle(pair, "elbow_flexor") == muscle
+
+
+def test_passive_elasticity_is_read_back_as_it_was_written(pair, elbow):
+    assert mjhill.read_passive(pair, "elbow") == elbow.passive
+    changed = dataclasses.replace(elbow.passive, k2_neg=9.0)
+    mjhill.write_passive(pair, "elbow", changed)
+    assert mjhill.read_passive(pair, "elbow") == changed
+
+
+def test_no_two_parameters_share_a_slot_and_the_gain_stays_silent():
+    assert len(set(SLOTS.values())) == len(SLOTS)
+    assert ("gainprm", 0) not in SLOTS.values()
+    assert ("dynprm", 0) not in SLOTS.values()
+    assert set(RATE_PARAMETERS) == set(SLOTS) - {"max_isometric_force"}
+
+
+def test_an_unknown_muscle_lists_those_there_are(pair):
+    with pytest.raises(ValueError, match="unknown muscle 'biceps'.*: elbow_flexor, elbow_extensor"):
+        mjhill.read_muscle(pair, "biceps")
+
+
+def test_a_joint_without_passive_elasticity_says_how_to_give_it_one():
+    model = mujoco.MjModel.from_xml_string(PAIR_XML)
+    with pytest.raises(ValueError, match="joint 'elbow' has no mjhill passive elasticity"):
+        mjhill.read_passive(model, "elbow")
+    with pytest.raises(ValueError, match="unknown joint 'knee'; the model's joints are: elbow"):
+        mjhill.read_passive(model, "knee")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({}, "give joint=... or tendon=..., one of the two"),
+        ({"joint": "elbow", "tendon": "t"}, "one of the two"),
+        ({"joint": "knee"}, "unknown joint 'knee'; there are: elbow"),
+        ({"tendon": "t"}, "unknown tendon 't'; there are: none"),
+        ({"joint": "elbow", "gear": 0.0}, "gear must not be 0"),
+    ],
+)
+def test_a_muscle_that_cannot_be_added_says_why(muscle, arguments, message):
+    spec = mujoco.MjSpec.from_string(PAIR_XML)
+    with pytest.raises(ValueError, match=message):
+        mjhill.add_muscle(spec, name="m", muscle=muscle, **arguments)
+
+
+def test_a_second_muscle_of_the_same_name_is_refused(muscle):
+    spec = mujoco.MjSpec.from_string(PAIR_XML)
+    mjhill.add_muscle(spec, name="m", muscle=muscle, joint="elbow")
+    with pytest.raises(ValueError, match="muscle 'm': the model has an actuator of that name"):
+        mjhill.add_muscle(spec, name="m", muscle=muscle, joint="elbow")
+
+
+def test_passive_elasticity_needs_a_scalar_joint(elbow):
+    spec = mujoco.MjSpec.from_string(PAIR_XML.replace('name="elbow"', 'name="elbow" type="ball"'))
+    with pytest.raises(ValueError, match="needs a hinge or slide joint"):
+        mjhill.add_passive(spec, joint="elbow", passive=elbow.passive)
