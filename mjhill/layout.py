@@ -93,6 +93,13 @@ def is_muscle(model: mujoco.MjModel, actuator: int) -> bool:
     )
 
 
+def turns(model: mujoco.MjModel, actuator: int) -> bool:
+    """Whether an actuator turns a hinge: its force is a torque [N·m], its length an angle [rad]."""
+    on_joint = model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_JOINT
+    joint = model.actuator_trnid[actuator, 0]
+    return bool(on_joint and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE)
+
+
 def muscle_names(model: mujoco.MjModel) -> list[str]:
     """Names of the muscles of a model, in the order of its actuators."""
     return [model.actuator(i).name for i in range(model.nactuator) if is_muscle(model, i)]

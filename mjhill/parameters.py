@@ -13,7 +13,8 @@ from types import MappingProxyType
 from typing import Any
 
 _DATA = Path(__file__).parent / "data" / "joints.toml"
-_FORCE, _LENGTH = "N·m|N", "rad|m"
+# units of a muscle on a hinge, and of one on a slide or tendon
+_FORCE, _LENGTH, _VELOCITY = ("N·m", "N"), ("rad", "m"), ("rad/s", "m/s")
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class Quantity:
 
     Attributes:
         symbol: Its symbol in the equations.
-        unit: Its unit; ``a|b`` reads ``a`` on a joint, ``b`` on a tendon.
+        units: Its unit on a hinge, and on a slide or tendon.
         meaning: One phrase.
         low: Lower bound.
         high: Upper bound, allowed.
@@ -30,7 +31,7 @@ class Quantity:
     """
 
     symbol: str
-    unit: str
+    units: tuple[str, str]
     meaning: str
     low: float
     high: float
@@ -47,16 +48,22 @@ class Quantity:
         above = self.low <= value if self.low_allowed else self.low < value
         if not (math.isfinite(value) and above and value <= self.high):
             bracket = "[" if self.low_allowed else "("
-            unit = "" if self.unit == "-" else f" {self.unit}"
+            unit = "" if self.units[0] == "-" else " " + " or ".join(dict.fromkeys(self.units))
             wanted = f"{bracket}{self.low:g}, {self.high:g}]{unit}"
             raise ValueError(f"{name} must be in {wanted}, got {value!r}")
 
 
 def _quantity(
-    symbol: str, unit: str, meaning: str, bounds: tuple[float, float], **options: Any
+    symbol: str,
+    unit: str | tuple[str, str],
+    meaning: str,
+    bounds: tuple[float, float],
+    *,
+    default: Any = MISSING,
+    low_allowed: bool = False,
 ) -> Any:
-    default = options.pop("default", MISSING)
-    quantity = Quantity(symbol, unit, meaning, *bounds, **options)
+    units = (unit, unit) if isinstance(unit, str) else unit
+    quantity = Quantity(symbol, units, meaning, *bounds, low_allowed)
     return field(default=default, metadata={"quantity": quantity})
 
 
@@ -102,7 +109,7 @@ class Muscle:
         "w_long", _LENGTH, "Gaussian width of active force above the optimum", (0, 1000)
     )
     max_velocity: float = _quantity(
-        "V_max", f"({_LENGTH})/s", "shortening velocity without load (eq. 3)", (0, 1e4)
+        "V_max", _VELOCITY, "shortening velocity without load (eq. 3)", (0, 1e4)
     )
     hill_shape: float = _quantity("A", "-", "Hill's a/F0, curvature of force-velocity (eq. 3)", (0, 10))
     series_stretch: float = _quantity(
@@ -163,10 +170,10 @@ class Passive:
     On a slide joint, read force [N] and length [m].
     """
 
-    k1_pos: float = _quantity("k1+", "N·m|N", "scale, positive side", (0, 1e6), low_allowed=True)
-    k2_pos: float = _quantity("k2+", "1/rad|1/m", "rate, positive side", (0, 1e4))
-    k1_neg: float = _quantity("k1-", "N·m|N", "scale, negative side", (0, 1e6), low_allowed=True)
-    k2_neg: float = _quantity("k2-", "1/rad|1/m", "rate, negative side", (0, 1e4))
+    k1_pos: float = _quantity("k1+", _FORCE, "scale, positive side", (0, 1e6), low_allowed=True)
+    k2_pos: float = _quantity("k2+", ("1/rad", "1/m"), "rate, positive side", (0, 1e4))
+    k1_neg: float = _quantity("k1-", _FORCE, "scale, negative side", (0, 1e6), low_allowed=True)
+    k2_neg: float = _quantity("k2-", ("1/rad", "1/m"), "rate, negative side", (0, 1e4))
     exponent_limit: float = _quantity(
         "z_max", "-", "k2 |q| past which the torque goes on straight", (1, 500), default=20.0
     )

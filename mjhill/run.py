@@ -10,7 +10,7 @@ import numpy as np
 
 from mjhill.checks import check_model
 from mjhill.install import installed_backend
-from mjhill.layout import address, is_muscle, joint_id, read_muscle
+from mjhill.layout import address, is_muscle, joint_id, read_muscle, turns
 from mjhill.python_callbacks import control
 from mjhill.readings import shortening_velocity, tension
 from mjhill.recording import Recording
@@ -197,11 +197,7 @@ def _native_readers(model: mujoco.MjModel, actuator: int) -> list[tuple[str, str
 
 
 def _muscle_units(model: mujoco.MjModel, actuator: int) -> tuple[str, str]:
-    joint = model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_JOINT
-    hinge = joint and model.jnt_type[model.actuator_trnid[actuator, 0]] == (
-        mujoco.mjtJoint.mjJNT_HINGE
-    )
-    return ("N·m", "rad") if hinge else ("N", "m")
+    return ("N·m", "rad") if turns(model, actuator) else ("N", "m")
 
 
 def _refresh(model: mujoco.MjModel, data: mujoco.MjData) -> None:

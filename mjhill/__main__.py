@@ -1,0 +1,5 @@
+"""``python -m mjhill``: the command line."""
+
+from mjhill.cli import main
+
+main()

@@ -1,0 +1,40 @@
+"""Benchmarks: what mjhill claims about accuracy and speed, measured on this machine."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Callable
+from importlib import import_module
+from importlib.metadata import version
+
+from mjhill.bench.result import Result
+
+NAMES = ("accuracy", "cost", "threads", "start", "video")
+
+
+def run(
+    names: tuple[str, ...], progress: Callable[[float], None] | None = None
+) -> dict[str, Result]:
+    """Run benchmarks by name, all without any.
+
+    Raises:
+        ValueError: There is no such benchmark; the message lists those there are.
+    """
+    for name in names:
+        if name not in NAMES:
+            raise ValueError(f"unknown benchmark {name!r}; there are: {', '.join(NAMES)}")
+    chosen = names or NAMES
+    results = {}
+    for index, name in enumerate(chosen):
+        results[name] = import_module(f"mjhill.bench.{name}").measure()
+        if progress is not None:
+            progress((index + 1) / len(chosen))
+    return results
+
+
+def versions() -> str:
+    """What the numbers were measured with."""
+    packages = ("mjhill", "mujoco", "numba", "numpy", "scipy")
+    listed = ", ".join(f"{name} {version(name)}" for name in packages)
+    return f"{listed}; Python {platform.python_version()}, {os.cpu_count()} cores"

@@ -1,0 +1,51 @@
+"""``mujoco.batch`` with compiled muscles: how much two threads bring."""
+
+from __future__ import annotations
+
+import statistics
+import time
+
+import mujoco
+import mujoco.batch
+import numpy as np
+
+from mjhill.bench.result import Result
+from mjhill.install import installed
+from mjhill.models import load
+
+SIMULATIONS, STEPS, ROUNDS = 256, 200, 21
+
+
+def measure() -> Result:
+    """Muscle steps per second on one and two threads, medians of interleaved rounds."""
+    model = load("elbow")
+    threads = (1, 2)
+    seconds: dict[int, list[float]] = {count: [] for count in threads}
+    states = {}
+    with installed():
+        batches = {}
+        for count in threads:
+            batches[count] = mujoco.batch.Batch(model, nsim=SIMULATIONS, nthread=count)
+            batches[count].ctrl = np.linspace(0, 1, 2 * SIMULATIONS).reshape(-1, 2)
+        for _ in range(ROUNDS):
+            for count, batch in batches.items():
+                start = time.perf_counter()
+                batch.step(nstep=STEPS)
+                seconds[count].append(time.perf_counter() - start)
+                states[count] = batch.state.copy()
+    medians = {count: statistics.median(values) for count, values in seconds.items()}
+    steps = SIMULATIONS * STEPS
+    rows = [
+        {
+            "threads": count,
+            "million steps/s": steps / medians[count] / 1e6,
+            "speed, 1 thread = 1": medians[1] / medians[count],
+            "same bits as 1 thread": str(np.array_equal(states[1], states[count])),
+        }
+        for count in threads
+    ]
+    notes = (
+        f"{SIMULATIONS} elbows x {STEPS} steps, {ROUNDS} rounds, interleaved, medians",
+        "goal: two threads at least 1.7 x one",
+    )
+    return Result("mujoco.batch on threads", rows, notes)

@@ -1,0 +1,319 @@
+"""The command line: ``mjhill demo``, ``list``, ``info``, ``run``, ``video``, ``compare``, ``bench``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+_OUT = Path("out")
+Progress = Callable[[float], None]
+
+
+class _Group(click.Group):
+    """Turns the errors that mjhill raises for people into one line and an exit code."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except (ValueError, TypeError, KeyError) as error:
+            self._fail(error, code=2)  # the input was wrong
+        except (RuntimeError, OSError) as error:
+            self._fail(error, code=1)  # the machine or the run was
+
+    @staticmethod
+    def _fail(error: Exception, code: int) -> None:
+        message = error.args[0] if isinstance(error, KeyError) else error
+        click.echo(f"error: {message}", err=True)
+        sys.exit(code)
+
+
+@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="mjhill")
+def main() -> None:
+    """Physiological muscle for MuJoCo: the Hill-based system of Winters & Stark (1987)."""
+
+
+def _inputs_option(function: Any) -> Any:
+    return click.option(
+        "--excite",
+        "-e",
+        multiple=True,
+        metavar="MUSCLE=LEVEL[@START[:END]]",
+        help="Neural input of a muscle, 0 to 1; several add up. Without any: the movement of demo.",
+    )(function)
+
+
+_json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+
+
+@main.command()
+@click.option("--output", "-o", type=click.Path(path_type=Path), default=_OUT, help="Folder.")
+@_json_option
+def demo(output: Path, as_json: bool) -> None:
+    """Run the elbow through its scripted movement; write video, plot and recording."""
+    from mjhill.demo import movement
+    from mjhill.parameters import JOINTS
+
+    joint = JOINTS["elbow"]
+    files = {
+        "video": output / "elbow.mp4",
+        "plot": output / "elbow.png",
+        "recording": output / "elbow.csv",
+    }
+    output.mkdir(parents=True, exist_ok=True)
+    recording = _film("elbow", movement(joint), duration=4.0, files=files)
+    _summary(recording, files, as_json)
+
+
+@main.command("list")
+@_json_option
+def list_(as_json: bool) -> None:
+    """List the joints that come with mjhill."""
+    from mjhill.parameters import JOINTS
+
+    rows = [
+        {
+            "joint": joint.name,
+            "positive": joint.positive,
+            "muscles": ", ".join(joint.muscles),
+            "inertia [kg·m²]": joint.inertia,
+        }
+        for joint in JOINTS.values()
+    ]
+    _table(rows, as_json, title="Joints")
+
+
+@main.command()
+@click.argument("model")
+@click.option("--mjcf", is_flag=True, help="Print the MJCF of the muscles instead.")
+@_json_option
+def info(model: str, mjcf: bool, as_json: bool) -> None:
+    """Show the parameters of MODEL, a joint's name or a path, with units and sources."""
+    from mjhill import describe
+
+    if mjcf:
+        click.echo(describe.mjcf(model))
+        return
+    _table(describe.rows(model), as_json, title=model)
+
+
+@main.command()
+@click.argument("model")
+@_inputs_option
+@click.option("--torque", "-t", multiple=True, metavar="JOINT=N·m[@START[:END]]")
+@click.option("--duration", "-d", default=4.0, show_default=True, help="Length [s].")
+@click.option("--output", "-o", type=click.Path(path_type=Path), help="Recording, .csv or .npz.")
+@click.option("--plot", "-p", type=click.Path(path_type=Path), help="Picture, .png.")
+@_json_option
+def run(
+    model: str,
+    excite: tuple[str, ...],
+    torque: tuple[str, ...],
+    duration: float,
+    output: Path | None,
+    plot: Path | None,
+    as_json: bool,
+) -> None:
+    """Run MODEL, a joint's name or a path, and record it."""
+    files = {"recording": output or _OUT / f"{Path(model).stem}.csv"}
+    if plot:
+        files["plot"] = plot
+    _make_default_folder(files)
+    recording = _film(model, _parse(excite), duration, files, torque=_parse(torque))
+    _summary(recording, files, as_json)
+
+
+@main.command()
+@click.argument("model")
+@_inputs_option
+@click.option("--duration", "-d", default=4.0, show_default=True, help="Length [s].")
+@click.option("--output", "-o", type=click.Path(path_type=Path), help="Film, .mp4 or .gif.")
+@click.option("--fps", default=30.0, show_default=True, help="Frames per second.")
+@click.option("--speed", default=1.0, show_default=True, help="1 is real time, less is slow.")
+@click.option("--size", nargs=2, type=int, default=(1280, 720), show_default=True)
+@click.option("--camera", help="Camera of the model.")
+@_json_option
+def video(model: str, excite: tuple[str, ...], as_json: bool, **options: Any) -> None:
+    """Film MODEL, a joint's name or a path, without a screen."""
+    output = options.pop("output") or _OUT / f"{Path(model).stem}.mp4"
+    files = {"video": output}
+    _make_default_folder(files)
+    duration = options.pop("duration")
+    recording = _film(model, _parse(excite), duration, files, **options)
+    _summary(recording, files, as_json)
+
+
+@main.command()
+@click.argument("model", default="elbow")
+@click.option("--output", "-o", type=click.Path(path_type=Path), default=_OUT / "compare")
+@click.option("--video/--no-video", default=True, show_default=True)
+@click.option("--cost/--no-cost", default=True, show_default=True, help="Time the steps too.")
+@_json_option
+def compare(model: str, output: Path, video: bool, cost: bool, as_json: bool) -> None:
+    """Compare MODEL's muscles with MuJoCo's own on the same plant and inputs."""
+    from dataclasses import asdict, replace
+
+    from mjhill import comparison
+
+    with _progress("comparing") as progress:
+        result = comparison.compare(model, progress=progress)
+    if cost:
+        with _progress("timing steps") as progress:
+            result = replace(result, cost=comparison.step_cost(model, progress=progress))
+    with _progress("writing") as progress:
+        paths = comparison.write(result, output, video=video, progress=progress)
+    if as_json:
+        click.echo(json.dumps(result.as_dict(), ensure_ascii=False))
+        return
+    _table([asdict(match) for match in result.matching], False, title="What is matched")
+    rows = [{**asdict(row), "ratio": row.ratio} for row in result.rows]
+    _table(rows, False, title="What differs")
+    if result.cost:
+        _table([result.cost.as_dict()], False, title="Cost of a step [µs]", across=False)
+    _paths({path.name: path for path in paths})
+
+
+@main.command()
+@click.argument("names", nargs=-1)
+@_json_option
+def bench(names: tuple[str, ...], as_json: bool) -> None:
+    """Measure accuracy, cost, threads, start and video, or those of NAMES."""
+    from mjhill import bench as benchmarks
+
+    with _progress("measuring") as progress:
+        results = benchmarks.run(names, progress)
+    if as_json:
+        click.echo(json.dumps({name: result.rows for name, result in results.items()}))
+        return
+    click.echo(benchmarks.versions())
+    for result in results.values():
+        _table(result.rows, False, title=result.title)
+        for note in result.notes:
+            click.echo(f"  {note}")
+
+
+def _film(
+    model: str,
+    excitation: dict[str, Any],
+    duration: float,
+    files: dict[str, Path],
+    torque: dict[str, Any] | None = None,
+    **video: Any,
+) -> Any:
+    """Run a model from its home pose and write what ``files`` names."""
+    from mjhill import scripted
+    from mjhill.files import check_writable
+
+    for path in files.values():
+        check_writable(path)
+    with _progress("running") as progress:
+        loaded, recording = scripted.run(model, excitation, torque or {}, duration, progress)
+    if "recording" in files:
+        recording.save(files["recording"])
+    if "plot" in files:
+        from mjhill.plots import plot_recording
+
+        plot_recording(recording, files["plot"], title=model)
+    if "video" in files:
+        from mjhill.render import View, render
+
+        with _progress("filming") as progress:
+            render(
+                View(loaded, recording),
+                files["video"],
+                progress=lambda done, total: progress(done / total),
+                **video,
+            )
+    return recording
+
+
+def _make_default_folder(files: dict[str, Path]) -> None:
+    if any(path.parent == _OUT for path in files.values()):
+        _OUT.mkdir(exist_ok=True)
+
+
+def _parse(items: tuple[str, ...]) -> dict[str, Any]:
+    """Signals from ``NAME=LEVEL[@START[:END]]``."""
+    from mjhill.signals import Signal, as_signal, pulse, step
+
+    signals: dict[str, Signal] = {}
+    for item in items:
+        name, found, text = item.partition("=")
+        level, at, span = text.partition("@")
+        start, colon, end = span.partition(":")
+        try:
+            if not found:
+                raise ValueError
+            if colon:
+                begin = float(start)
+                signal = pulse(float(level), begin, float(end) - begin)
+            else:
+                signal = step(float(level), float(start)) if at else as_signal(float(level))
+        except ValueError:
+            raise ValueError(
+                f"input {item!r} must read NAME=LEVEL, NAME=LEVEL@START or NAME=LEVEL@START:END, "
+                "such as elbow_flexor=0.5@0.1:0.3 (times in s, END after START)"
+            ) from None
+        signals[name] = signals[name] + signal if name in signals else signal
+    return signals
+
+
+@contextmanager
+def _progress(what: str) -> Iterator[Progress]:
+    from rich.console import Console
+    from rich.progress import Progress as Bars
+
+    with Bars(console=Console(stderr=True), transient=True) as bars:
+        bar = bars.add_task(what, total=1.0)
+        yield lambda share: bars.update(bar, completed=share)
+
+
+def _table(
+    rows: list[dict[str, Any]], as_json: bool, title: str, across: bool = True
+) -> None:
+    if as_json:
+        click.echo(json.dumps(rows, ensure_ascii=False))
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    if not across:
+        rows = [{"quantity": key, "value": value} for row in rows for key, value in row.items()]
+    table = Table(title=title, title_justify="left")
+    for column in rows[0] if rows else []:
+        table.add_column(column)
+    for row in rows:
+        table.add_row(*(_cell(value) for value in row.values()))
+    # a pipe has no width of its own; rich would cut the sources at 80 columns
+    Console(width=None if sys.stdout.isatty() else 160).print(table)
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _summary(recording: Any, files: dict[str, Path], as_json: bool) -> None:
+    from mjhill.scripted import summary
+
+    numbers = summary(recording)
+    if as_json:
+        paths = {name: str(path) for name, path in files.items()}
+        click.echo(json.dumps({"files": paths, **numbers}, ensure_ascii=False))
+        return
+    for name, value in numbers.items():
+        click.echo(f"{name}: {_cell(value)}")
+    _paths(files)
+
+
+def _paths(files: dict[str, Path]) -> None:
+    width = max(map(len, files))
+    for name, path in files.items():
+        click.echo(f"{name:<{width}}  {path}")

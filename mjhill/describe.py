@@ -1,0 +1,93 @@
+"""A model's parameters as rows of a table, and as MJCF."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from mjhill.layout import (
+    has_passive,
+    muscle_names,
+    parameter_rows,
+    passive_row,
+    read_muscle,
+    read_passive,
+    turns,
+)
+from mjhill.models import load
+from mjhill.parameters import JOINTS, quantities
+
+
+def rows(model: str | Path) -> list[dict[str, Any]]:
+    """Every parameter of a joint or of the muscles in a file.
+
+    Each row has ``of``, ``parameter``, ``symbol``, ``value``, ``unit``, ``meaning`` and
+    ``source``; a model from a file states no sources.
+
+    Raises:
+        ValueError: As ``load``.
+    """
+    if str(model) in JOINTS:
+        joint = JOINTS[str(model)]
+        parts: list[tuple[str, Any, bool]] = [(joint.name, joint, True)]
+        parts.append((joint.name, joint.passive, True))
+        parts += [(name, muscle, True) for name, muscle in joint.muscles.items()]
+    else:
+        loaded = load(model)
+        parts = [(name, read_passive(loaded, name), hinge) for name, hinge in _elastic(loaded)]
+        for name in muscle_names(loaded):
+            hinge = turns(loaded, loaded.actuator(name).id)
+            parts.append((name, read_muscle(loaded, name), hinge))
+    return [row for part in parts for row in _part_rows(*part)]
+
+
+def _elastic(model: mujoco.MjModel) -> Iterator[tuple[str, bool]]:
+    """Joints with passive elasticity, and whether each is a hinge."""
+    for joint in range(model.njnt):
+        if has_passive(model, joint):
+            hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
+            yield model.joint(joint).name, bool(hinge)
+
+
+def mjcf(model: str | Path) -> str:
+    """The attributes of MJCF that hold the parameters, for pasting into a model.
+
+    Raises:
+        ValueError: As ``load``.
+    """
+    loaded = load(model)
+    lines = []
+    for name, _ in _elastic(loaded):
+        lines.append(f'<joint name="{name}" user="{_text(passive_row(read_passive(loaded, name)))}"/>')
+    for name in muscle_names(loaded):
+        rows = parameter_rows(read_muscle(loaded, name))
+        lines += [
+            f'<general name="{name}" gear="{loaded.actuator(name).gear[0]:g}" dyntype="user"',
+            '  actdim="3" gaintype="fixed" biastype="user" ctrlrange="0 1" lengthrange="-1 1"',
+            *(f'  {array}="{_text(row)}"' for array, row in rows.items()),
+        ]
+        lines[-1] += "/>"
+    return "\n".join(lines)
+
+
+def _part_rows(name: str, part: Any, hinge: bool) -> Iterator[dict[str, Any]]:
+    for parameter, quantity in quantities(type(part)):
+        # a part read from a file states no sources, one of ours states all but defaults
+        source = part.sources.get(parameter, "default" if part.sources else "")
+        yield {
+            "of": name,
+            "parameter": parameter,
+            "symbol": quantity.symbol,
+            "value": getattr(part, parameter),
+            "unit": quantity.units[0 if hinge else 1],
+            "meaning": quantity.meaning,
+            "source": source,
+        }
+
+
+def _text(row: Any) -> str:
+    """Shortest exact decimals."""
+    return " ".join(repr(value).removesuffix(".0") for value in row.tolist())
