@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import mujoco
@@ -30,8 +31,8 @@ _ACTIVATION_COLOURS = np.array([[0.33, 0.35, 0.48], [0.62, 0.24, 0.34], [0.86, 0
 
 # of the tendon's length in qpos0; chosen by eye
 _STRAND_RADIUS = 0.013
-_BELLY_RADIUS = 0.036  # without force
-_BELLY_SWELLING = 0.052  # what the maximum isometric force adds
+_BELLY_RADIUS = 0.034  # without force
+_BELLY_SWELLING = 0.050  # what the maximum isometric force adds; with its root, as cross-sections
 _BELLY_START = 0.05  # from the path's first end, the origin
 _TENDON_LENGTH = 0.27  # from the belly to the path's last end, the insertion
 _ARC_STEP = 0.4  # of a drawn arc [rad]
@@ -83,7 +84,8 @@ def drawn_muscles(model: mujoco.MjModel, recording: Recording | None) -> tuple[D
         name = model.actuator(i).name
         force = _max_force(model, i)
         wanted = {f"{name}.a", f"{name}.force"}
-        if force is None or (recording is not None and not wanted <= set(recording)):
+        recorded = recording is None or wanted <= set(recording)
+        if force is None or not name or not recorded:
             continue
         colour = MUSCLE_COLOURS[len(found) % len(MUSCLE_COLOURS)]
         found.append(DrawnMuscle(name, force, _tendon(model, i), colour))
@@ -110,11 +112,11 @@ def muscle_shapes(
     """
     shapes: list[Shape] = []
     rest = float(model.tendon_length0[muscle.tendon])
-    radius = rest * (_BELLY_RADIUS + _BELLY_SWELLING * min(max(force, 0.0), 1.3))
+    radius = rest * (_BELLY_RADIUS + _BELLY_SWELLING * math.sqrt(min(max(force, 0.0), 1.5)))
     for branch in _branches(model, data, muscle.tendon):
         shapes += [
             Shape(mujoco.mjtGeom.mjGEOM_CAPSULE, a, b, _STRAND_RADIUS * rest, belly=False)
-            for a, b in zip(branch[:-1], branch[1:], strict=True)
+            for a, b in pairwise(branch)
         ]
         shapes += _belly(branch, rest, radius)
     return shapes
@@ -197,7 +199,9 @@ def _belly(branch: Points, rest: float, radius: float) -> list[Shape]:
         return [Shape(mujoco.mjtGeom.mjGEOM_ELLIPSOID, spine[0], spine[-1], radius, belly=True)]
     middles = (np.arange(len(spine) - 1) + 0.5) / (len(spine) - 1)
     return [
-        Shape(mujoco.mjtGeom.mjGEOM_CAPSULE, a, b, radius * math.sin(math.pi * t) ** 0.7, belly=True)
+        Shape(
+            mujoco.mjtGeom.mjGEOM_CAPSULE, a, b, radius * math.sin(math.pi * t) ** 0.7, belly=True
+        )
         for a, b, t in zip(spine[:-1], spine[1:], middles, strict=True)
     ]
 

@@ -61,7 +61,9 @@ def mjcf(model: str | Path) -> str:
     loaded = load(model)
     lines = []
     for name, _ in _elastic(loaded):
-        lines.append(f'<joint name="{name}" user="{_text(passive_row(read_passive(loaded, name)))}"/>')
+        lines.append(
+            f'<joint name="{name}" user="{_text(passive_row(read_passive(loaded, name)))}"/>'
+        )
     for name in muscle_names(loaded):
         rows = parameter_rows(read_muscle(loaded, name))
         lines += [

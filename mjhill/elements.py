@@ -116,10 +116,7 @@ def series_stretch_at(force: float, stretch_max: float, shape: float, limit: flo
     """Stretch of the series element that carries a force [F_max]: ``series_force`` inverted."""
     growth = 1.0 + force * (exp(shape) - 1.0)
     growth_limit = exp(shape * limit)
-    if growth <= growth_limit:
-        z = log(growth)
-    else:
-        z = shape * limit + growth / growth_limit - 1.0
+    z = log(growth) if growth <= growth_limit else shape * limit + growth / growth_limit - 1.0
     return z * stretch_max / shape
 
 

@@ -26,6 +26,7 @@ _NAMES = ("act_dyn", "act_bias", "passive")
 _ACTUATOR = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
 _GENERIC = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 _TYPES: dict[str, Any] = {"act_dyn": _ACTUATOR, "act_bias": _ACTUATOR, "passive": _GENERIC}
+_C_FUNCTION: Any = _GENERIC.__mro__[1]  # the base of every ctypes function
 _lock = threading.RLock()
 
 
@@ -39,8 +40,10 @@ class _Slot:
     @property
     def is_python(self) -> bool:
         """Whether the callback is a Python function, reached through the bindings."""
-        return self.pointer is not None and callable(self.holder) and not isinstance(
-            self.holder, ctypes._CFuncPtr
+        return (
+            self.pointer is not None
+            and callable(self.holder)
+            and not isinstance(self.holder, _C_FUNCTION)
         )
 
 
@@ -193,9 +196,7 @@ def _actuator(
     return result
 
 
-def _passive(
-    next_: Callable[..., None] | None, model: mujoco.MjModel, data: mujoco.MjData
-) -> None:
+def _passive(next_: Callable[..., None] | None, model: mujoco.MjModel, data: mujoco.MjData) -> None:
     if next_:
         next_(model, data)
     python_callbacks.passive(model, data)

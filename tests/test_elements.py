@@ -1,3 +1,4 @@
+import itertools
 import math
 
 import pytest
@@ -63,7 +64,7 @@ def test_slope_of_the_velocity_is_its_derivative(force, hypothetical):
 def test_velocity_falls_with_force_without_a_jump():
     forces = [0.002 * k for k in range(2000)]
     velocities = [velocity(f, 0.5, viscosity=1e-3) for f in forces]
-    assert all(a > b for a, b in zip(velocities, velocities[1:], strict=False))
+    assert all(a > b for a, b in itertools.pairwise(velocities))
 
 
 def test_series_element_carries_maximum_force_at_its_maximum_stretch():
@@ -77,9 +78,7 @@ def test_series_element_is_slack_when_it_is_not_stretched():
 
 def test_series_stiffness_is_linear_in_force_as_equation_6_says():
     points = [elements.series_force(x, 0.3, 3.0, 2.0) for x in (0.05, 0.2, 0.5)]
-    slopes = [
-        (k2 - k1) / (f2 - f1) for (f1, k1), (f2, k2) in zip(points, points[1:], strict=False)
-    ]
+    slopes = [(k2 - k1) / (f2 - f1) for (f1, k1), (f2, k2) in itertools.pairwise(points)]
     assert slopes == pytest.approx([3.0 / 0.3] * 2)
 
 

@@ -155,9 +155,13 @@ def test_a_callback_replaced_meanwhile_is_noticed_before_the_next_run(pair):
 
 
 def test_an_exception_outlives_a_replaced_callback():
-    with pytest.raises(KeyError) as caught, mjhill.installed("python"):
-        mujoco.set_mjcb_passive(None)
-        raise KeyError("cause")
+    def replace_and_fail():
+        with mjhill.installed("python"):
+            mujoco.set_mjcb_passive(None)
+            raise KeyError("cause")
+
+    with pytest.raises(KeyError) as caught:
+        replace_and_fail()
     assert "mjcb_passive was replaced" in caught.value.__notes__[0]
     assert raw_callbacks() == [None, None, None]
 

@@ -67,8 +67,8 @@ def test_a_failed_save_leaves_the_old_file_and_nothing_else(recording, tmp_path,
     ("text", "message"),
     [
         ("a,b\n1,2\n", "not a mjhill recording"),
-        ('# {}\ntime [s],x [m]\n0.0,abc\n', "damaged recording"),
-        ('# {}\ntime [s],x [m]\n0.0\n1.0,2.0\n', "damaged recording"),
+        ("# {}\ntime [s],x [m]\n0.0,abc\n", "damaged recording"),
+        ("# {}\ntime [s],x [m]\n0.0\n1.0,2.0\n", "damaged recording"),
     ],
 )
 def test_a_file_that_is_no_recording_is_refused(tmp_path, text, message):

@@ -247,6 +247,21 @@ def test_a_dead_encoder_is_reported_and_leaves_no_file(elbow, tmp_path):
     assert encoders() == []
 
 
+def test_a_full_disk_is_reported_and_leaves_no_file(tmp_path):
+    program = (
+        "import resource, mujoco, numpy as np\n"
+        "from mjhill.recording import Recording; from mjhill.render import View, render\n"
+        "m = mujoco.MjModel.from_xml_string('<mujoco/>')\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (300, 300))\n"
+        f"path = {str(tmp_path / 'a.mp4')!r}\n"
+        "try: render(View(m, Recording(np.array([0, 1.0]), {}, {})), path, size=(64, 64))\n"
+        "except RuntimeError as error: print(error)"
+    )
+    result = run_python(program)
+    assert "the video encoder stopped" in result.stdout, result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

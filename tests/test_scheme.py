@@ -62,9 +62,7 @@ def test_a_stiff_stretch_lands_near_its_equilibrium_at_any_step(dt):
     force = 1e-3
     stretch = 0.05
     for _ in range(40):
-        stretch = scheme.advance_stretch(
-            stretch, 0.0, force, *CE.values(), *SE.values(), dt, 2
-        )
+        stretch = scheme.advance_stretch(stretch, 0.0, force, *CE.values(), *SE.values(), dt, 2)
     assert stretch == pytest.approx(elements.series_stretch_at(force, *SE.values()), rel=1e-3)
 
 
