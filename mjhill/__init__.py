@@ -1,7 +1,7 @@
 """Physiological muscle for MuJoCo: the Hill-based system of Winters & Stark (1987)."""
 
-from mjhill.checks import check_model as check_model
 from mjhill import reference as reference
+from mjhill.checks import check_model as check_model
 from mjhill.equilibrium import equilibrate as equilibrate
 from mjhill.install import install as install
 from mjhill.install import installed as installed

@@ -116,5 +116,7 @@ def stable_timesteps(model: mujoco.MjModel, muscles: dict[str, Muscle]) -> dict[
         growth = math.exp(muscle.series_shape)
         stiffness = muscle.max_isometric_force * muscle.series_shape / muscle.series_stretch
         stiffness *= growth / (growth - 1)
-        limits[name] = 2 / math.sqrt(2 * stiffness * inverse_inertia) if inverse_inertia else math.inf
+        limits[name] = (
+            2 / math.sqrt(2 * stiffness * inverse_inertia) if inverse_inertia else math.inf
+        )
     return limits

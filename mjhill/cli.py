@@ -1,4 +1,4 @@
-"""The command line: ``mjhill demo``, ``list``, ``info``, ``run``, ``video``, ``compare``, ``bench``."""
+"""The command line: demo, list, info, run, video, compare, bench."""
 
 from __future__ import annotations
 
@@ -57,17 +57,13 @@ _json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.
 @_json_option
 def demo(output: Path, as_json: bool) -> None:
     """Run the elbow through its scripted movement; write video, plot and recording."""
-    from mjhill.demo import movement
-    from mjhill.parameters import JOINTS
-
-    joint = JOINTS["elbow"]
     files = {
         "video": output / "elbow.mp4",
         "plot": output / "elbow.png",
         "recording": output / "elbow.csv",
     }
     output.mkdir(parents=True, exist_ok=True)
-    recording = _film("elbow", movement(joint), duration=4.0, files=files)
+    recording = _film("elbow", {}, duration=4.0, files=files)
     _summary(recording, files, as_json)
 
 
@@ -274,9 +270,7 @@ def _progress(what: str) -> Iterator[Progress]:
         yield lambda share: bars.update(bar, completed=share)
 
 
-def _table(
-    rows: list[dict[str, Any]], as_json: bool, title: str, across: bool = True
-) -> None:
+def _table(rows: list[dict[str, Any]], as_json: bool, title: str, across: bool = True) -> None:
     if as_json:
         click.echo(json.dumps(rows, ensure_ascii=False))
         return

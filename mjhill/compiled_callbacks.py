@@ -36,7 +36,12 @@ from mjhill.layout import MUSCLE_TAG, NUSER_JNT, PASSIVE_TAG, SLOTS, STATES
 from mjhill.structs import mujoco_library, offset, verify
 
 _ROW = 8 * 10  # bytes of one actuator's dynprm, gainprm or biasprm
-_JIT = {"error_model": "numpy", "nogil": True, "forceinline": True, "fastmath": {"contract", "arcp", "nsz"}}
+_JIT: dict[str, Any] = {
+    "error_model": "numpy",
+    "nogil": True,
+    "forceinline": True,
+    "fastmath": {"contract", "arcp", "nsz"},
+}
 _RK4 = int(mujoco.mjtIntegrator.mjINT_RK4)
 _USER = int(mujoco.mjtDyn.mjDYN_USER)
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -251,9 +256,7 @@ def _make_act_bias(key: int) -> Any:
 
 
 def _make_passive(key: int) -> Any:
-    m_njnt, m_nuser, m_user = map(
-        offset, ("mjModel.njnt", "mjModel.nuser_jnt", "mjModel.jnt_user")
-    )
+    m_njnt, m_nuser, m_user = map(offset, ("mjModel.njnt", "mjModel.nuser_jnt", "mjModel.jnt_user"))
     m_type, m_qposadr = offset("mjModel.jnt_type"), offset("mjModel.jnt_qposadr")
     m_dofadr, m_treeid = offset("mjModel.jnt_dofadr"), offset("mjModel.dof_treeid")
     m_spring, d_awake = offset("mjModel.qpos_spring"), offset("mjData.tree_awake")

@@ -89,6 +89,7 @@ def arrange(size: tuple[int, int], index: int, count: int, muscles: int) -> Pane
     room = height - title_height - legend_height
     picture_height = room if wide else round(0.47 * room)
     legend_top = title_height + picture_height
+    gap = max(1, round(4 * unit)) if count > 1 else 0  # pictures side by side are of one size
     if wide:
         curves = Box(left + column, 0, right - left - column, height)
     else:
@@ -97,7 +98,7 @@ def arrange(size: tuple[int, int], index: int, count: int, muscles: int) -> Pane
     return Panel(
         unit,
         Box(left, 0, column, title_height),
-        Box(left, title_height, column, picture_height),
+        Box(left, title_height, column - gap, picture_height),
         Box(left, legend_top, column, row_height),
         tuple(
             _legend_row(left, legend_top + row_height * (i + 1), row_height, unit)

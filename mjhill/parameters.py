@@ -111,7 +111,9 @@ class Muscle:
     max_velocity: float = _quantity(
         "V_max", _VELOCITY, "shortening velocity without load (eq. 3)", (0, 1e4)
     )
-    hill_shape: float = _quantity("A", "-", "Hill's a/F0, curvature of force-velocity (eq. 3)", (0, 10))
+    hill_shape: float = _quantity(
+        "A", "-", "Hill's a/F0, curvature of force-velocity (eq. 3)", (0, 10)
+    )
     series_stretch: float = _quantity(
         "x_max", _LENGTH, "stretch of the series element at F_max (eq. 7)", (0, 100)
     )

@@ -25,42 +25,40 @@ class Poses:
 
     Attributes:
         time: Sample times [s], shape (T,).
-        base: ``qpos`` of what is not recorded, shape (nq,).
+        nq: Length of ``qpos``.
         scalars: Address in ``qpos`` and values, shape (T,), of hinges and slides.
         others: The same of ball and free joints.
     """
 
     time: NDArray[np.float64]
-    base: NDArray[np.float64]
+    nq: int
     scalars: tuple[tuple[int, NDArray[np.float64]], ...]
     others: tuple[tuple[int, NDArray[np.float64]], ...]
 
     @staticmethod
     def of(model: mujoco.MjModel, recording: Recording) -> Poses:
-        """The poses of a recording; joints without a name stay where ``qpos0`` has them.
+        """The poses of a recording.
 
         Raises:
-            ValueError: A named joint of the model is not in the recording.
+            ValueError: A joint of the model is not in the recording.
         """
         scalars: list[tuple[int, NDArray[np.float64]]] = []
         others: list[tuple[int, NDArray[np.float64]]] = []
         for i in range(model.njnt):
-            joint = model.joint(i)
-            if not joint.name:
-                continue
+            name = model.joint(i).name or f"joint{i}"  # as ``record`` calls it
             coordinates = _COORDINATES[int(model.jnt_type[i])]
             kept = scalars if len(coordinates) == 1 else others
             for k, coordinate in enumerate(coordinates):
-                values = _series(recording, joint.name, coordinate)
+                values = _series(recording, name, coordinate)
                 kept.append((int(model.jnt_qposadr[i]) + k, values))
-        return Poses(recording.time, model.qpos0.copy(), tuple(scalars), tuple(others))
+        return Poses(recording.time, int(model.nq), tuple(scalars), tuple(others))
 
     def at(self, time: float) -> NDArray[np.float64]:
         """``qpos`` at ``time`` [s], shape (nq,); before and after the recording its ends.
 
         Hinges and slides are interpolated; a quaternion is that of the nearest sample.
         """
-        qpos = self.base.copy()
+        qpos = np.zeros(self.nq)
         for address, values in self.scalars:
             qpos[address] = np.interp(time, self.time, values)
         if self.others:

@@ -5,6 +5,7 @@ No MuJoCo in here: only the equations and the parameters.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -59,12 +60,12 @@ def simulate(
     inputs = as_signals(excitation, joint.muscles, "muscle")
     inputs = {name: inputs.get(name, as_signal(0.0)) for name in joint.muscles}
     load = as_signal(torque)
-    times = np.arange(round(duration / sample) + 1) * sample
+    times: _Vector = np.arange(round(duration / sample) + 1, dtype=np.float64) * sample
     knots = _knots([*inputs.values(), load], float(times[-1]))
     state = rest_state(joint) if start is None else np.array(start, dtype=np.float64)
     states = np.empty((len(times), len(state)))
     states[0] = state
-    for begin, end in zip(knots[:-1], knots[1:], strict=True):
+    for begin, end in itertools.pairwise(knots):
         fuzz = 1e-9 * sample
         inside = (times > begin + fuzz) & (times <= end + fuzz)
         rates = _rates(joint, inputs, load, begin, end)

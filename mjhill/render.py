@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.bellies import DrawnMuscle, drawn_muscles
+from mjhill.curves import make_plots
 from mjhill.dashboard import Reading, make_dashboard
 from mjhill.files import check_writable, replacing
 from mjhill.panels import arrange
 from mjhill.poses import Poses, rest_pose
 from mjhill.recording import Recording
 from mjhill.stage import Stage, stage
-from mjhill.timeplot import Side, make_plots
+from mjhill.timeplot import Side
 from mjhill.video import SUFFIXES, video_writer
 
 Image = NDArray[np.uint8]
@@ -96,30 +97,23 @@ def render(
     _check_film(views, path, fps, speed)
     _check_size(size, even=True)
     span = _span(views)
-    frames = max(1, round((span[1] - span[0]) / speed * fps))
-    poses = [Poses.of(view.model, view.recording) for view in views]
+    times = span[0] + np.arange(max(1, round((span[1] - span[0]) / speed * fps))) * speed / fps
+    note = "" if speed == 1 else f"{speed:g}\N{MULTIPLICATION SIGN} speed"
+    sides = [_side(view, note, size, i, len(views)) for i, view in enumerate(views)]
     with replacing(path) as partial, ExitStack() as stack:
-        note = "" if speed == 1 else f"{speed:g}× speed"
-        sides = [_side(view, note, size, i, len(views)) for i, view in enumerate(views)]
         reels = [
-            _Reel(
-                stack.enter_context(stage(view.model, side.muscles, _picture_size(side), camera)),
-                pose,
-                view.recording,
-                side.muscles,
-            )
-            for view, side, pose in zip(views, sides, poses, strict=True)
+            stack.enter_context(_reel(view, side, camera))
+            for view, side in zip(views, sides, strict=True)
         ]
         dashboard = make_dashboard(sides, size, span)
         append = stack.enter_context(video_writer(partial, size, fps))
         frame = np.empty((size[1], size[0], 3), dtype=np.uint8)
-        for k in range(frames):
-            time = min(span[0] + k * speed / fps, span[1])
+        for k, time in enumerate(times.tolist()):
             pictures, readings = zip(*(reel.frame(time) for reel in reels), strict=True)
             dashboard.compose(frame, time, pictures, readings)
             append(frame)
             if progress is not None:
-                progress(k + 1, frames)
+                progress(k + 1, len(times))
     return path
 
 
@@ -179,13 +173,15 @@ def _side(view: View, note: str, size: tuple[int, int], index: int, count: int) 
     return Side(panel, view.title, muscles, units, make_plots(view.recording, muscles), note)
 
 
-def _picture_size(side: Side) -> tuple[int, int]:
-    return side.panel.picture.width, side.panel.picture.height
+@contextmanager
+def _reel(view: View, side: Side, camera: str | None) -> Iterator[_Reel]:
+    poses = Poses.of(view.model, view.recording)
+    size = (side.panel.picture.width, side.panel.picture.height)
+    with stage(view.model, side.muscles, size, camera) as scene:
+        yield _Reel(scene, poses, view.recording, side.muscles)
 
 
-def _readings(
-    recording: Recording, muscles: Sequence[DrawnMuscle], time: float
-) -> list[Reading]:
+def _readings(recording: Recording, muscles: Sequence[DrawnMuscle], time: float) -> list[Reading]:
     def value(name: str) -> float:
         return float(np.interp(time, recording.time, recording[name]))
 

@@ -192,7 +192,11 @@ def _native_readers(model: mujoco.MjModel, actuator: int) -> list[tuple[str, str
     return [
         (f"{name}.u", "-", _item("ctrl", int(model.actuator_ctrladr[actuator]))),
         (f"{name}.a", "-", _item("act", int(model.actuator_actadr[actuator]))),
-        (f"{name}.force", effort, _item("actuator_force", int(model.actuator_outadr[actuator]), -1)),
+        (
+            f"{name}.force",
+            effort,
+            _item("actuator_force", int(model.actuator_outadr[actuator]), -1),
+        ),
     ]
 
 
@@ -223,4 +227,3 @@ def _about(model: mujoco.MjModel) -> dict[str, Any]:
         "backend": installed_backend() or "none",
         "mujoco": mujoco.__version__,
     }
-

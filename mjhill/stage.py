@@ -42,9 +42,7 @@ class Stage:
     _context: Any
     _pixels: Image
 
-    def picture(
-        self, qpos: NDArray[np.float64], looks: Sequence[tuple[float, float]]
-    ) -> Image:
+    def picture(self, qpos: NDArray[np.float64], looks: Sequence[tuple[float, float]]) -> Image:
         """The scene as an image; valid until the next call.
 
         Args:
@@ -163,9 +161,10 @@ def _open_context(model: mujoco.MjModel, size: tuple[int, int]) -> tuple[Any, An
     except (ImportError, AttributeError, OSError, RuntimeError, mujoco.FatalError) as error:
         if gl is not None:
             gl.free()
+        reason = str(error).rstrip(". ")
         choice = os.environ.get("MUJOCO_GL") or "unset"
         raise RuntimeError(
-            f"cannot render: no OpenGL context (MUJOCO_GL is {choice}): {error}. On a machine "
+            f"cannot render: no OpenGL context (MUJOCO_GL is {choice}): {reason}. On a machine "
             "without a screen set MUJOCO_GL=egl and install EGL, on Debian or Ubuntu with "
             "'apt-get install libegl1 libgles2 libgl1-mesa-dri'"
         ) from error

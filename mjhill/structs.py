@@ -43,7 +43,9 @@ def offset(path: str) -> int:
     for name in names:
         field = getattr(kind, name, None)
         if field is None:
-            raise RuntimeError(f"MuJoCo {mujoco.__version__} has no {path}; mjhill needs MuJoCo 4.x")
+            raise RuntimeError(
+                f"MuJoCo {mujoco.__version__} has no {path}; mjhill needs MuJoCo 4.x"
+            )
         total += field.offset
         kind = dict(kind._fields_)[name]
     return total

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.bellies import Colour, DrawnMuscle
+from mjhill.bellies import DrawnMuscle
+from mjhill.curves import Plot, common_limits
 from mjhill.panels import Box, Panel
-from mjhill.recording import Recording
 
 Image = NDArray[np.uint8]
 
@@ -19,44 +19,7 @@ _DPI = 100.0
 _INK = "#2b2b33"
 _SOFT = "#6a6a75"
 _FAINT = 0.22  # opacity of what is yet to come
-_JOINT_COLOURS = ((0.17, 0.17, 0.20), (0.45, 0.33, 0.60), (0.30, 0.52, 0.50), (0.60, 0.50, 0.30))
 _GLYPHS = "0123456789.- +tsenaif"
-
-
-@dataclass(frozen=True)
-class Curve:
-    """One line of a plot.
-
-    Attributes:
-        label: What it is.
-        time: Times [s], shape (T,).
-        values: Values in the plot's unit, shape (T,).
-        colour: RGB in [0, 1].
-    """
-
-    label: str
-    time: NDArray[np.float64]
-    values: NDArray[np.float64]
-    colour: Colour
-
-
-@dataclass(frozen=True)
-class Plot:
-    """One pair of axes.
-
-    Attributes:
-        title: Quantity and unit.
-        curves: The lines.
-        floor: Lowest value that must be seen.
-        ceiling: Highest value that must be seen.
-        named: Whether the curves are told apart by a legend of their own.
-    """
-
-    title: str
-    curves: tuple[Curve, ...]
-    floor: float | None = None
-    ceiling: float | None = None
-    named: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,51 +58,18 @@ class Layers:
     axes: tuple[tuple[Box, ...], ...]
 
 
-def make_plots(recording: Recording, muscles: Sequence[DrawnMuscle]) -> tuple[Plot, ...]:
-    """Angle of each joint, activation and force of each muscle; what there is of these."""
-    time = recording.time
-
-    def curves(names: Iterable[tuple[str, str, Colour]], factor: float = 1.0) -> tuple[Curve, ...]:
-        return tuple(
-            Curve(label, time, factor * recording[name], colour) for label, name, colour in names
-        )
-
-    def joints(quantity: str) -> list[tuple[str, str, Colour]]:
-        names = [name for name in recording if name.endswith(f".{quantity}")]
-        colours = (_JOINT_COLOURS[i % len(_JOINT_COLOURS)] for i in range(len(names)))
-        return [
-            (name.removesuffix(f".{quantity}"), name, colour)
-            for name, colour in zip(names, colours, strict=True)
-        ]
-
-    def of_muscles(quantity: str) -> list[tuple[str, str, Colour]]:
-        return [(m.name, f"{m.name}.{quantity}", m.colour) for m in muscles]
-
-    angles, positions = joints("angle"), joints("position")
-    units = dict.fromkeys(recording.units[f"{m.name}.force"] for m in muscles)
-    plots = (
-        Plot(_titled(angles, "angle", "deg"), curves(angles, 180 / np.pi), named=len(angles) > 1),
-        Plot(_titled(positions, "position", "m"), curves(positions), named=len(positions) > 1),
-        Plot("activation [-]", curves(of_muscles("a")), 0.0, 1.0),
-        Plot(f"force [{', '.join(units)}]", curves(of_muscles("force")), 0.0),
-    )
-    return tuple(plot for plot in plots if plot.curves)
-
-
-def draw_layers(
-    sides: Sequence[Side], size: tuple[int, int], span: tuple[float, float]
-) -> Layers:
+def draw_layers(sides: Sequence[Side], size: tuple[int, int], span: tuple[float, float]) -> Layers:
     """Draw titles, legends and curves over the time ``span`` [s] into a frame of ``size`` [px]."""
     figure, canvas = _figure(*size)
     axes: list[tuple[Box, ...]] = []
     lines: list[Any] = []
-    limits = _limits(sides)
+    limits = common_limits(plot for side in sides for plot in side.plots)
     for side in sides:
         _draw_texts(figure, size, side)
         boxes = _axes_boxes(side.panel, len(side.plots))
         for k, (plot, box) in enumerate(zip(side.plots, boxes, strict=True)):
             last = k == len(side.plots) - 1
-            plane = _draw_axes(figure, size, side.panel, plot, box, last)
+            plane = _draw_axes(figure, size, side.panel, plot, box, last=last)
             plane.set_xlim(*span)
             plane.set_ylim(*limits[plot.title])
             lines += plane.get_lines()
@@ -191,10 +121,11 @@ def _draw_texts(figure: Any, size: tuple[int, int], side: Side) -> None:
     panel, unit = side.panel, side.panel.unit
 
     def write(left: float, box: Box, words: str, pixels: float, **style: Any) -> None:
-        y = 1 - (box.top + 0.70 * box.height) / height
-        _text(figure, left / width, y, words, pixels * unit, **style)
+        baseline = box.top + box.height / 2 + 0.36 * pixels * unit  # centres the capitals
+        _text(figure, left / width, 1 - baseline / height, words, pixels * unit, **style)
 
-    write(panel.title.left + 14 * unit, panel.title, side.title, 20, weight="bold")
+    title = _shortened(side.title, 34 if not side.note else 26)
+    write(panel.title.left + 14 * unit, panel.title, title, 20, weight="bold")
     end = panel.title.left + panel.title.width - 150 * unit
     write(end, panel.title, side.note, 14, color=_SOFT, ha="right")
     if panel.rows:
@@ -215,7 +146,7 @@ def _draw_texts(figure: Any, size: tuple[int, int], side: Side) -> None:
 
 
 def _draw_axes(
-    figure: Any, size: tuple[int, int], panel: Panel, plot: Plot, box: Box, last: bool
+    figure: Any, size: tuple[int, int], panel: Panel, plot: Plot, box: Box, *, last: bool
 ) -> Any:
     width, height = size
     bottom = 1 - (box.top + box.height) / height
@@ -246,7 +177,7 @@ def _draw_axes(
 
 def _axes_boxes(panel: Panel, number: int) -> tuple[Box, ...]:
     area, pixels = panel.curves, panel.pixels
-    left, right, above, below = pixels(72), pixels(26), pixels(44), pixels(54)
+    left, right, above, below = pixels(72), pixels(26), pixels(40), pixels(54)
     width = max(1, area.width - left - right)
     room = max(number, area.height - number * above - below)
     height = max(1, room // max(1, number))
@@ -254,27 +185,6 @@ def _axes_boxes(panel: Panel, number: int) -> tuple[Box, ...]:
         Box(area.left + left, area.top + above + k * (height + above), width, height)
         for k in range(number)
     )
-
-
-def _limits(sides: Sequence[Side]) -> dict[str, tuple[float, float]]:
-    """Limits of the plots by title, the same in all panels so that they can be compared."""
-    limits: dict[str, tuple[float, float]] = {}
-    for plot in (plot for side in sides for plot in side.plots):
-        values = [curve.values[np.isfinite(curve.values)] for curve in plot.curves]
-        known = [v for v in (plot.floor, plot.ceiling, *limits.get(plot.title, ())) if v is not None]
-        lowest = min([*known, *(float(v.min()) for v in values if v.size)], default=0.0)
-        highest = max([*known, *(float(v.max()) for v in values if v.size)], default=1.0)
-        limits[plot.title] = (lowest, max(highest, lowest + 1e-9))
-    return {title: _padded(*pair) for title, pair in limits.items()}
-
-
-def _padded(lowest: float, highest: float) -> tuple[float, float]:
-    margin = 0.05 * (highest - lowest) if highest - lowest > 1e-6 else 0.5
-    return lowest - margin, highest + margin
-
-
-def _titled(joints: Sequence[tuple[str, str, Colour]], quantity: str, unit: str) -> str:
-    return f"{joints[0][0]} {quantity} [{unit}]" if len(joints) == 1 else f"{quantity} [{unit}]"
 
 
 def _shortened(name: str, length: int = 19) -> str:

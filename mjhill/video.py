@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -49,38 +49,39 @@ def video_writer(
     )
     with writer:
         # mediapy keeps the process to itself, and on failure waits for it with its pipe open
-        process: subprocess.Popen[bytes] = writer._proc
+        process: Any = writer._proc
         try:
-            yield _appender(writer, process)
+            yield partial(_checked, process, writer.add_image)
+            _checked(process, writer.close)
         except BaseException:
             _end(process)
             writer._popen = writer._proc = None
             raise
 
 
-def _appender(
-    writer: Any, process: subprocess.Popen[bytes]
-) -> Callable[[NDArray[np.uint8]], None]:
-    def append(frame: NDArray[np.uint8]) -> None:
-        try:
-            writer.add_image(frame)
-        except OSError as error:
-            process.wait()
-            words = process.stderr.read().decode(errors="replace").strip() if process.stderr else ""
-            raise RuntimeError(
-                f"the video encoder stopped: {words or f'exit status {process.returncode}'}"
-            ) from error
+def _checked(process: Any, action: Callable[..., None], *frame: Any) -> None:
+    """Do something with the encoder, and if it is dead say why.
 
-    return append
+    Raises:
+        RuntimeError: It is.
+    """
+    try:
+        action(*frame)
+    except (OSError, RuntimeError) as error:
+        process.kill()
+        status = process.wait()
+        words = process.stderr.read().decode(errors="replace").strip()
+        # mediapy may have read the encoder's words into its own error
+        reason = words or (str(error) if isinstance(error, RuntimeError) else f"status {status}")
+        raise RuntimeError(f"the video encoder stopped: {reason}; is the disk full?") from error
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def _end(process: Any) -> None:
     """Kill the encoder and close its pipes."""
     process.kill()
     for pipe in (process.stdin, process.stderr):
-        if pipe is not None:
-            with suppress(OSError):
-                pipe.close()
+        with suppress(OSError):
+            pipe.close()
     process.wait()
 
 

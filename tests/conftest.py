@@ -58,9 +58,7 @@ def pair_spec(joint: mjhill.Joint) -> mujoco.MjSpec:
     """The smallest model of a joint: one body, one hinge, two muscles, passive elasticity."""
     spec = mujoco.MjSpec.from_string(PAIR_XML)
     for name, parameters in joint.muscles.items():
-        mjhill.add_muscle(
-            spec, name=name, muscle=parameters, joint="elbow", gear=joint.gears[name]
-        )
+        mjhill.add_muscle(spec, name=name, muscle=parameters, joint="elbow", gear=joint.gears[name])
     mjhill.add_passive(spec, joint="elbow", passive=joint.passive)
     return spec
 

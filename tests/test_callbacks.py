@@ -84,7 +84,9 @@ def test_every_option_of_the_muscle_is_served_alike_by_both_back_ends(elbow, mus
         muscle, electrical_stimulation=True, velocity_activation=0.6, eccentric_slope_ratio=5.0,
         width_short=0.8, series_limit=1.2, viscosity=0.02, activation_floor=0.01,
     )  # fmt: skip
-    model = pair_spec(dataclasses.replace(elbow, muscles={**elbow.muscles, "elbow_flexor": unusual}))
+    model = pair_spec(
+        dataclasses.replace(elbow, muscles={**elbow.muscles, "elbow_flexor": unusual})
+    )
     model = model.compile()
     python, compiled = (trajectory(model, backend) for backend in ("python", "compiled"))
     np.testing.assert_allclose(compiled, python, rtol=1e-9, atol=1e-11)

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import mujoco
 
-from mjhill.layout import address, muscle_names, read_muscle
-from mjhill.native import (
+from mjhill.comparison.native import (
     NativeMuscle,
     compiled,
     muscle_delay,
@@ -17,6 +16,7 @@ from mjhill.native import (
     native_spec,
     read_spec,
 )
+from mjhill.layout import address, muscle_names, read_muscle
 from mjhill.parameters import Muscle
 
 _PART = 0.5  # control at which the size dependence of MuJoCo's activation is shown
@@ -52,7 +52,7 @@ def matching(model: str | Path) -> tuple[Match, ...]:
         model: A joint's name, such as ``"elbow"``, or a path to an MJCF file.
 
     Raises:
-        ValueError: As ``native.native_model``.
+        ValueError: As ``native_model``.
     """
     spec = read_spec(model)
     ours, native = compiled(spec), compiled(native_spec(spec))

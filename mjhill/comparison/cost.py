@@ -1,0 +1,188 @@
+"""Cost of a step with our muscles, with MuJoCo's and with none, measured in one interleaved run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjhill.comparison.native import compiled, converted, native_spec, read_spec
+from mjhill.install import Backend, installed
+from mjhill.layout import muscle_names
+from mjhill.parameters import Muscle
+
+_INTEGRATORS = tuple(mujoco.mjtIntegrator.__members__.values())
+_DRIVE = 0.3  # control of the muscle that is on, the others are at a tenth of it
+
+
+@dataclass(frozen=True)
+class StepCost:
+    """Medians of what a step takes [µs], and their half interquartile ranges.
+
+    Attributes:
+        bare: With motors in the place of the muscles.
+        native: With MuJoCo's muscles.
+        mjhill: With ours.
+        bare_spread: Half of the interquartile range of ``bare``.
+        native_spread: The same of ``native``.
+        mjhill_spread: The same of ``mjhill``.
+        muscles: Muscles in the model.
+        rounds: Timed blocks of each model.
+        steps: Steps in a block.
+        backend: What ran our muscles.
+        integrator: MuJoCo's integrator.
+    """
+
+    bare: float
+    native: float
+    mjhill: float
+    bare_spread: float
+    native_spread: float
+    mjhill_spread: float
+    muscles: int
+    rounds: int
+    steps: int
+    backend: Backend
+    integrator: str
+
+    @property
+    def native_per_muscle(self) -> float:
+        """What one of MuJoCo's muscles adds to the bare step [µs]."""
+        return (self.native - self.bare) / self.muscles
+
+    @property
+    def mjhill_per_muscle(self) -> float:
+        """What one of our muscles adds to the bare step [µs]."""
+        return (self.mjhill - self.bare) / self.muscles
+
+    @property
+    def ratio(self) -> float:
+        """A whole step with our muscles over one with MuJoCo's [-]."""
+        return self.mjhill / self.native
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it, what follows included, as what JSON can hold."""
+        derived = ("native_per_muscle", "mjhill_per_muscle", "ratio")
+        return {**asdict(self), **{name: getattr(self, name) for name in derived}}
+
+
+def step_cost(
+    model: str | Path = "elbow",
+    *,
+    rounds: int = 400,
+    steps: int = 500,
+    backend: Backend = "compiled",
+    integrator: str | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> StepCost:
+    """Time steps of the bare plant, with MuJoCo's muscles and with ours: A B C A B C ...
+
+    Each round times one block of steps of each model, so that a machine that slows down slows
+    all three. The muscle that is on changes from block to block, so the joint is in motion.
+    Our callbacks are installed throughout: the joint's exponential elasticity is in all three.
+
+    Args:
+        model: A joint's name, such as ``"elbow"``, or a path to an MJCF file.
+        rounds: Timed blocks of each model.
+        steps: Steps in a block.
+        backend: What runs our muscles.
+        integrator: MuJoCo's integrator, such as ``"Euler"``; the model's own without it.
+        progress: Called now and then with the share done, 0 to 1.
+
+    Raises:
+        ValueError: ``rounds`` or ``steps`` is less than 1, the integrator is unknown, or as
+            ``native_model``.
+        RuntimeError: MuJoCo warned of a bad state.
+    """
+    for what, value in (("rounds", rounds), ("steps", steps)):
+        if value < 1:
+            raise ValueError(f"{what} must be at least 1, got {value}")
+    spec = read_spec(model)
+    if integrator is not None:
+        spec.option.integrator = _integrator(integrator)
+    models = [compiled(kind) for kind in (bare_spec(spec), native_spec(spec), spec)]
+    with installed(backend):
+        times = _time_blocks(models, rounds, steps, progress)
+    per_step = 1e6 * times / steps
+    low, middle, high = np.quantile(per_step, [0.25, 0.5, 0.75], axis=0).tolist()
+    names = ("bare", "native", "mjhill")
+    spreads = [0.5 * (top - bottom) for top, bottom in zip(high, low, strict=True)]
+    return StepCost(
+        **dict(zip(names, middle, strict=True)),
+        **dict(zip([f"{name}_spread" for name in names], spreads, strict=True)),
+        muscles=len(muscle_names(models[-1])),
+        rounds=rounds,
+        steps=steps,
+        backend=backend,
+        integrator=_integrator_name(models[-1].opt.integrator),
+    )
+
+
+def _time_blocks(
+    models: list[mujoco.MjModel],
+    rounds: int,
+    steps: int,
+    progress: Callable[[float], None] | None,
+) -> NDArray[np.float64]:
+    """Time [s] of each block of steps, shape (rounds, number of models)."""
+    datas = [mujoco.MjData(model) for model in models]
+    times = np.empty((rounds, len(models)))
+    for block in range(-3, rounds):  # three to warm up, overwritten by the first
+        for kind, (model, data) in enumerate(zip(models, datas, strict=True)):
+            data.ctrl[:] = 0.1 * _DRIVE
+            data.ctrl[block % model.nu] = _DRIVE
+            start = time.perf_counter()
+            mujoco.mj_step(model, data, nstep=steps)
+            times[max(block, 0), kind] = time.perf_counter() - start
+        if progress is not None and block >= 0:
+            progress((block + 1) / rounds)
+    for model, data in zip(models, datas, strict=True):
+        _check_motion(model, data)
+    return times
+
+
+def bare_spec(spec: mujoco.MjSpec) -> mujoco.MjSpec:
+    """A copy of a model in which a motor, as strong as the muscle, stands for each of ours.
+
+    Raises:
+        ValueError: The model has no muscle of ours.
+    """
+
+    def convert(actuator: mujoco.MjsActuator, muscle: Muscle, length0: float) -> None:
+        del length0
+        gear = -float(actuator.gear[0]) * muscle.max_isometric_force
+        actuator.set_to_motor()
+        actuator.actdim = -1  # left to the compiler
+        actuator.gear = [gear, 0, 0, 0, 0, 0]
+        for row in (actuator.dynprm, actuator.biasprm):
+            row[:] = 0.0
+        actuator.gainprm = [1.0] + [0.0] * 9
+
+    return converted(spec, convert, states=0)
+
+
+def _check_motion(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    for index, warning in enumerate(data.warning):
+        if warning.number:
+            name = mujoco.mjtWarning(index).name.removeprefix("mjWARN_").lower()
+            raise RuntimeError(
+                f"MuJoCo warned '{name}' while steps were timed; lower the timestep, now "
+                f"{model.opt.timestep:g} s"
+            )
+
+
+def _integrator_name(value: int) -> str:
+    return str(mujoco.mjtIntegrator(value).name).removeprefix("mjINT_").lower()
+
+
+def _integrator(name: str) -> int:
+    known = {_integrator_name(int(each)): int(each) for each in _INTEGRATORS}
+    if name.lower() not in known:
+        raise ValueError(f"unknown integrator {name!r}; there are: {', '.join(known)}")
+    return known[name.lower()]
