@@ -75,6 +75,7 @@ def _compile_equations(*modules: ModuleType) -> dict[str, Callable[..., Any]]:
 _equations = _compile_equations(elements, scheme)
 muscle_rates = _equations["muscle_rates"]
 series_force = _equations["series_force"]
+present_length = _equations["present_length"]
 passive_torque = _equations["passive_torque"]
 
 
@@ -225,7 +226,9 @@ def _make_act_bias(key: int) -> Any:
     m_gainprm, m_actnum = offset("mjModel.actuator_gainprm"), offset("mjModel.actuator_actnum")
     m_actadr, m_outadr = offset("mjModel.actuator_actadr"), offset("mjModel.actuator_outadr")
     m_length0 = offset("mjModel.actuator_length0")
-    d_act, d_length = offset("mjData.act"), offset("mjData.actuator_length")
+    m_timestep, m_integrator = offset("mjModel.opt.timestep"), offset("mjModel.opt.integrator")
+    d_act, d_act_dot = offset("mjData.act"), offset("mjData.act_dot")
+    d_length = offset("mjData.actuator_length")
     stretch_max, shape, limit = map(_slot, ("series_stretch", "series_shape", "series_limit"))
     max_force = _slot("max_isometric_force")
 
@@ -243,8 +246,14 @@ def _make_act_bias(key: int) -> Any:
         length = load_double(load_pointer(d + d_length) + out) - load_double(
             load_pointer(m + m_length0) + out
         )
+        contractile = present_length(
+            load_int(m + m_integrator) == _RK4,
+            load_double(load_pointer(d + d_act) + first + 16),
+            load_double(load_pointer(d + d_act_dot) + first + 16),
+            load_double(m + m_timestep),
+        )
         force, _ = series_force(
-            length - load_double(load_pointer(d + d_act) + first + 16),
+            length - contractile,
             load_double(gain + stretch_max),
             load_double(gain + shape),
             load_double(gain + limit),

@@ -102,7 +102,7 @@ def series_force(
     Returns:
         force [F_max]; stiffness [F_max per unit of stretch].
     """
-    if stretch <= 0:
+    if stretch < 0:
         return 0.0, 0.0
     z = shape * stretch / stretch_max
     z_limit = shape * limit

@@ -7,7 +7,7 @@ import math
 import mujoco
 
 from mjhill.layout import addresses, read_muscle
-from mjhill.python_callbacks import control
+from mjhill.python_callbacks import control, muscle_length
 from mjhill.readings import steady_stretch
 
 
@@ -27,6 +27,6 @@ def equilibrate(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     mujoco.mj_fwdPosition(model, data)
     for name, address in addresses(model):
         u = control(model, data, address.actuator)
-        length = float(data.actuator_length[address.out] - model.actuator_length0[address.out])
+        length = muscle_length(model, data, address.actuator)
         stretch = steady_stretch(read_muscle(model, name), u, length)
         data.act[address.act : address.act + 3] = u, u, length - stretch

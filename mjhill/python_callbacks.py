@@ -7,7 +7,7 @@ import numpy as np
 
 from mjhill.elements import passive_torque, series_force
 from mjhill.layout import NUSER_JNT, RATE_PARAMETERS, SLOTS, has_passive, is_muscle
-from mjhill.scheme import muscle_rates
+from mjhill.scheme import muscle_rates, present_length
 
 _SCALAR_JOINTS = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
 
@@ -20,12 +20,12 @@ def act_dyn(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float 
     act = model.actuator_actadr[actuator]
     n, a, s = data.act[act : act + 3].tolist()
     data.act_dot[act : act + 3] = muscle_rates(
-        bool(model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4),
+        _is_staged(model),
         control(model, data, actuator),
         n,
         a,
         s,
-        float(data.actuator_length[out] - model.actuator_length0[out]),
+        muscle_length(model, data, actuator),
         float(data.actuator_velocity[out]),
         float(model.opt.timestep),
         *(_parameter(model, actuator, name) for name in RATE_PARAMETERS),
@@ -37,16 +37,33 @@ def act_bias(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float
     """Force of a muscle on its joint or tendon; None if the actuator is not one."""
     if not is_muscle(model, actuator):
         return None
-    out = model.actuator_outadr[actuator]
-    length = float(data.actuator_length[out] - model.actuator_length0[out])
     force, _ = series_force(
-        length - float(data.act[model.actuator_actadr[actuator] + 2]),
+        series_stretch(model, data, actuator),
         _parameter(model, actuator, "series_stretch"),
         _parameter(model, actuator, "series_shape"),
         _parameter(model, actuator, "series_limit"),
     )
     # tension is positive in elements; MuJoCo's force is positive when it lengthens the actuator
     return -force * _parameter(model, actuator, "max_isometric_force")
+
+
+def series_stretch(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:
+    """Stretch of the series element now [rad or m]; needs the rates of ``mj_forward``."""
+    s = model.actuator_actadr[actuator] + 2
+    contractile = present_length(
+        _is_staged(model), float(data.act[s]), float(data.act_dot[s]), float(model.opt.timestep)
+    )
+    return muscle_length(model, data, actuator) - contractile
+
+
+def muscle_length(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:
+    """Length of a muscle, less that at ``qpos0`` [rad or m]."""
+    out = model.actuator_outadr[actuator]
+    return float(data.actuator_length[out] - model.actuator_length0[out])
+
+
+def _is_staged(model: mujoco.MjModel) -> bool:
+    return bool(model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4)
 
 
 def passive(model: mujoco.MjModel, data: mujoco.MjData) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from mjhill.checks import check_model
 from mjhill.install import installed_backend
 from mjhill.layout import address, is_muscle, joint_id, read_muscle, turns
-from mjhill.python_callbacks import control
+from mjhill.python_callbacks import control, muscle_length, series_stretch
 from mjhill.readings import shortening_velocity, tension
 from mjhill.recording import Recording
 from mjhill.signals import Signal, as_signals
@@ -167,14 +167,12 @@ def _muscle_readers(model: mujoco.MjModel, actuator: int) -> list[tuple[str, str
     muscle, at = read_muscle(model, name), address(model, name)
     effort, length_unit = _muscle_units(model, actuator)
 
-    def length(data: mujoco.MjData) -> float:
-        return float(data.actuator_length[at.out] - model.actuator_length0[at.out])
-
     def stretch(data: mujoco.MjData) -> float:
-        return length(data) - float(data.act[at.act + 2])
+        return series_stretch(model, data, actuator)
 
     def velocity(data: mujoco.MjData) -> float:
-        return shortening_velocity(muscle, float(data.act[at.act + 1]), length(data), stretch(data))
+        length = muscle_length(model, data, actuator)
+        return shortening_velocity(muscle, float(data.act[at.act + 1]), length, stretch(data))
 
     return [
         (f"{name}.u", "-", lambda data: control(model, data, actuator)),

@@ -76,6 +76,10 @@ def test_series_element_is_slack_when_it_is_not_stretched():
     assert elements.series_force(0.0, 0.3, 3.0, 2.0)[0] == 0.0
 
 
+def test_a_series_element_about_to_stretch_has_its_stiffness_already():
+    assert elements.series_force(0.0, 0.3, 3.0, 2.0)[1] > 0
+
+
 def test_series_stiffness_is_linear_in_force_as_equation_6_says():
     points = [elements.series_force(x, 0.3, 3.0, 2.0) for x in (0.05, 0.2, 0.5)]
     slopes = [(k2 - k1) / (f2 - f1) for (f1, k1), (f2, k2) in itertools.pairwise(points)]

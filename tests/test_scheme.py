@@ -57,6 +57,22 @@ def test_stretch_is_advanced_with_second_order(hypothetical, length_rate):
     assert errors[1] < 1e-9 or 3.0 < errors[0] / errors[1] < 5.5
 
 
+@pytest.mark.parametrize("dt", [1e-3, 1e-2])
+def test_slack_is_taken_up_without_overshoot(dt):
+    hypothetical, stretch = 0.2, -0.05
+    balance = elements.series_stretch_at(hypothetical, *SE.values())
+    history = []
+    for _ in range(200):
+        stretch = scheme.advance_stretch(
+            stretch, 0.0, hypothetical, *CE.values(), *SE.values(), dt, 1
+        )
+        history.append(stretch)
+    assert max(history) <= balance * 1.001
+    assert history[-1] == pytest.approx(balance, rel=1e-3)
+    # one exponential step across a curved force-velocity relation
+    assert exact_stretch(-0.05, 0.0, hypothetical, dt) == pytest.approx(history[0], abs=dt)
+
+
 @pytest.mark.parametrize("dt", [1e-3, 1e-2, 1.0])
 def test_a_stiff_stretch_lands_near_its_equilibrium_at_any_step(dt):
     force = 1e-3
