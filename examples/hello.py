@@ -9,8 +9,7 @@ import mjhill
 
 def main() -> None:
     model = mjhill.load("elbow")
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    data = mjhill.at_home(model)
     with mjhill.installed():
         data.ctrl[:] = [0.5, 0.0]  # flexor, extensor
         mujoco.mj_step(model, data, nstep=500)

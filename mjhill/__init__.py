@@ -2,6 +2,7 @@
 
 from mjhill import reference as reference
 from mjhill.checks import check_model as check_model
+from mjhill.equilibrium import at_home as at_home
 from mjhill.equilibrium import equilibrate as equilibrate
 from mjhill.install import install as install
 from mjhill.install import installed as installed
@@ -19,6 +20,9 @@ from mjhill.parameters import Joint as Joint
 from mjhill.parameters import Muscle as Muscle
 from mjhill.parameters import Passive as Passive
 from mjhill.recording import Recording as Recording
+from mjhill.rendering import View as View
+from mjhill.rendering import render as render
+from mjhill.rendering import snapshot as snapshot
 from mjhill.run import record as record
 from mjhill.signals import Signal as Signal
 from mjhill.signals import constant as constant

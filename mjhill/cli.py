@@ -217,7 +217,7 @@ def _film(
 
         plot_recording(recording, files["plot"], title=model)
     if "video" in files:
-        from mjhill.render import View, render
+        from mjhill.rendering import View, render
 
         with _progress("filming") as progress:
             render(

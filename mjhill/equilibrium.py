@@ -6,9 +6,22 @@ import math
 
 import mujoco
 
+from mjhill.callbacks.python import control, muscle_length
 from mjhill.layout import addresses, read_muscle
-from mjhill.python_callbacks import control, muscle_length
 from mjhill.readings import steady_stretch
+
+
+def at_home(model: mujoco.MjModel) -> mujoco.MjData:
+    """Data at the model's key ``home``, or at ``qpos0`` without one, with steady muscles.
+
+    The controls are those of the key, or 0.
+    """
+    data = mujoco.MjData(model)
+    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, "home")
+    if key >= 0:
+        mujoco.mj_resetDataKeyframe(model, data, key)
+    equilibrate(model, data)
+    return data
 
 
 def equilibrate(model: mujoco.MjModel, data: mujoco.MjData) -> None:

@@ -17,8 +17,8 @@ from typing import Any, Literal, get_args
 
 import mujoco
 
-from mjhill import python_callbacks
-from mjhill.structs import mujoco_library
+from mjhill.callbacks import python as python_backend
+from mjhill.callbacks.structs import mujoco_library
 
 Backend = Literal["compiled", "python"]
 
@@ -179,7 +179,7 @@ def _put_python(served: dict[str, _Slot]) -> None:
         if name == "passive":
             function: Callable[..., Any] = partial(_passive, next_)
         else:
-            function = partial(_actuator, getattr(python_callbacks, name), next_)
+            function = partial(_actuator, getattr(python_backend, name), next_)
         getattr(mujoco, f"set_mjcb_{name}")(function)
 
 
@@ -199,7 +199,7 @@ def _actuator(
 def _passive(next_: Callable[..., None] | None, model: mujoco.MjModel, data: mujoco.MjData) -> None:
     if next_:
         next_(model, data)
-    python_callbacks.passive(model, data)
+    python_backend.passive(model, data)
 
 
 def _callable(name: str, slot: _Slot) -> Callable[..., Any] | None:
@@ -262,6 +262,6 @@ def _global(name: str) -> ctypes.c_void_p:
 
 @cache
 def _compiled() -> Any:
-    from mjhill.compiled_callbacks import build
+    from mjhill.callbacks.compiled import build
 
     return build()

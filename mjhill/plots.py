@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.bellies import MUSCLE_COLOURS
 from mjhill.files import check_writable, replacing
 from mjhill.recording import Recording
+from mjhill.rendering.bellies import MUSCLE_COLOURS
 
 _Colour = str | tuple[float, float, float]
 

@@ -8,10 +8,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjhill.callbacks.python import control, muscle_length, series_stretch
 from mjhill.checks import check_model
 from mjhill.install import installed_backend
 from mjhill.layout import address, is_muscle, joint_id, read_muscle, turns
-from mjhill.python_callbacks import control, muscle_length, series_stretch
 from mjhill.readings import shortening_velocity, tension
 from mjhill.recording import Recording
 from mjhill.signals import Signal, as_signals

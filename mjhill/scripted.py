@@ -8,7 +8,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from mjhill.equilibrium import equilibrate
+from mjhill.equilibrium import at_home
 from mjhill.install import installed
 from mjhill.layout import muscle_names
 from mjhill.models import load
@@ -60,11 +60,7 @@ def run(
         RuntimeError: As ``record``.
     """
     loaded = load(model)
-    data = mujoco.MjData(loaded)
-    home = mujoco.mj_name2id(loaded, mujoco.mjtObj.mjOBJ_KEY, "home")
-    if home >= 0:
-        mujoco.mj_resetDataKeyframe(loaded, data, home)
-    equilibrate(loaded, data)
+    data = at_home(loaded)
     inputs = excitation or (movement(muscle_names(loaded)) if not torque else {})
     with installed():
         recording = record(

@@ -4,7 +4,7 @@ import mujoco
 import pytest
 
 import mjhill
-from mjhill.structs import mujoco_library
+from mjhill.callbacks.structs import mujoco_library
 
 CALLBACKS = ("mjcb_act_dyn", "mjcb_act_bias", "mjcb_passive")
 

@@ -218,7 +218,7 @@ def test_the_video_shows_both_models_side_by_side(
         calls.append((views, path, speed))
         progress(1, 2)
 
-    monkeypatch.setattr("mjhill.render.render", render)
+    monkeypatch.setattr("mjhill.rendering.render", render)
     paths = write(comparison, tmp_path, progress=shares.append)
     views, path, speed = calls[0]
     assert path == paths[-1] == tmp_path / "comparison.mp4"

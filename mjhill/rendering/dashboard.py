@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.bellies import activation_colour
-from mjhill.panels import Box, LegendRow
-from mjhill.timeplot import Image, Layers, Side, column, draw_glyphs, draw_layers
+from mjhill.rendering.bellies import activation_colour
+from mjhill.rendering.panels import Box, LegendRow
+from mjhill.rendering.timeplot import Image, Layers, Side, column, draw_glyphs, draw_layers
 
 _TRACK = np.array([0.90, 0.90, 0.92])  # an empty bar
 _FORCE = np.array([0.30, 0.30, 0.36])  # a full one

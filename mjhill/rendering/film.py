@@ -13,16 +13,16 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.bellies import DrawnMuscle, drawn_muscles
-from mjhill.curves import make_plots
-from mjhill.dashboard import Reading, make_dashboard
 from mjhill.files import check_writable, replacing
-from mjhill.panels import arrange
-from mjhill.poses import Poses, rest_pose
 from mjhill.recording import Recording
-from mjhill.stage import Stage, stage
-from mjhill.timeplot import Side
-from mjhill.video import SUFFIXES, video_writer
+from mjhill.rendering.bellies import DrawnMuscle, drawn_muscles
+from mjhill.rendering.curves import make_plots
+from mjhill.rendering.dashboard import Reading, make_dashboard
+from mjhill.rendering.panels import arrange
+from mjhill.rendering.poses import Poses, rest_pose
+from mjhill.rendering.stage import Stage, stage
+from mjhill.rendering.timeplot import Side
+from mjhill.rendering.video import SUFFIXES, video_writer
 
 Image = NDArray[np.uint8]
 Progress = Callable[[int, int], None]

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.bellies import DrawnMuscle, activation_colour, add_shape, muscle_shapes
+from mjhill.rendering.bellies import DrawnMuscle, activation_colour, add_shape, muscle_shapes
 
 Image = NDArray[np.uint8]
 

@@ -20,8 +20,9 @@ import llvmlite.binding as llvm
 import mujoco
 import numba
 
-from mjhill import elements, intrinsics, layout, scheme
-from mjhill.intrinsics import (
+from mjhill import elements, layout, scheme
+from mjhill.callbacks import intrinsics
+from mjhill.callbacks.intrinsics import (
     chained_act_bias,
     chained_act_dyn,
     chained_passive,
@@ -32,8 +33,8 @@ from mjhill.intrinsics import (
     read_delayed_control,
     store_double,
 )
+from mjhill.callbacks.structs import mujoco_library, offset, verify
 from mjhill.layout import MUSCLE_TAG, NUSER_JNT, PASSIVE_TAG, SLOTS, STATES
-from mjhill.structs import mujoco_library, offset, verify
 
 _ROW = 8 * 10  # bytes of one actuator's dynprm, gainprm or biasprm
 _JIT: dict[str, Any] = {
@@ -123,7 +124,7 @@ _GENERIC = (numba.void, (numba.int64, numba.int64))
 
 
 def _make_control() -> Any:
-    """The input the engine would use, see ``python_callbacks.control``."""
+    """The input the engine would use, see ``python.control``."""
     m_ctrladr = offset("mjModel.actuator_ctrladr")
     m_delay = offset("mjModel.actuator_delay")
     m_history = offset("mjModel.actuator_history")

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.bellies import Colour, DrawnMuscle
 from mjhill.recording import Recording
+from mjhill.rendering.bellies import Colour, DrawnMuscle
 
 _JOINT_COLOURS = ((0.17, 0.17, 0.20), (0.45, 0.33, 0.60), (0.30, 0.52, 0.50), (0.60, 0.50, 0.30))
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.bellies import DrawnMuscle
-from mjhill.curves import Plot, common_limits
-from mjhill.panels import Box, Panel
+from mjhill.rendering.bellies import DrawnMuscle
+from mjhill.rendering.curves import Plot, common_limits
+from mjhill.rendering.panels import Box, Panel
 
 Image = NDArray[np.uint8]
 
