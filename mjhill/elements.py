@@ -62,8 +62,8 @@ def contractile_velocity(
     plateau: float,
     slope_ratio: float,
     viscosity: float,
-) -> tuple[float, float]:
-    """Shortening velocity of the contractile element under a force, and its slope.
+) -> tuple[float, float, float]:
+    """Shortening velocity of the contractile element under a force, and its slope as a ratio.
 
     Shortening: force = H hill (1 - v)/(hill + v) - viscosity v, Hill's relation (eqs. 3-5)
     with H the hypothetical force. Lengthening at w = -v: force = H (1 + (plateau - 1) w/(w + c))
@@ -72,14 +72,15 @@ def contractile_velocity(
     plateau a finite slope. Either branch is a quadratic in the velocity.
 
     Returns:
-        velocity [V_max], positive when shortening; d velocity/d force [V_max/F_max], negative.
+        velocity [V_max], positive when shortening; then two positive numbers p and q such that
+        d velocity/d force = -p/q [V_max/F_max]: the caller divides by more, and only once.
     """
     deficit = hypothetical - force
     if deficit >= 0:
         linear = force + hypothetical * hill + viscosity * hill
         root = sqrt(linear * linear + 4 * viscosity * hill * deficit)
         velocity = 2 * hill * deficit / (linear + root)
-        return velocity, -(velocity + hill) / root
+        return velocity, velocity + hill, root
     excess = -deficit
     c = (plateau - 1) * hill / ((1 + hill) * slope_ratio)
     linear = hypothetical * (plateau - 1) + viscosity * c - excess
@@ -88,7 +89,7 @@ def contractile_velocity(
         lengthening = 2 * c * excess / (linear + root)
     else:
         lengthening = (root - linear) / (2 * viscosity)
-    return -lengthening, -(lengthening + c) / root
+    return -lengthening, lengthening + c, root
 
 
 def series_force(
@@ -104,12 +105,13 @@ def series_force(
     """
     if stretch < 0:
         return 0.0, 0.0
-    z = shape * stretch / stretch_max
+    rate = shape / stretch_max
+    z = rate * stretch
     z_limit = shape * limit
     scale = 1.0 / (exp(shape) - 1.0)
     growth = exp(min(z, z_limit))
     force = scale * (growth * (1.0 + max(z - z_limit, 0.0)) - 1.0)
-    return force, scale * growth * shape / stretch_max
+    return force, scale * growth * rate
 
 
 def series_stretch_at(force: float, stretch_max: float, shape: float, limit: float) -> float:

@@ -24,27 +24,26 @@ from mjhill.elements import (
 )
 
 
-def relaxed(z: float) -> float:
-    """(exp(z) - 1)/z for z <= 0, by the (1, 2) Padé approximant of exp.
+def relaxed(p: float, q: float) -> float:
+    """(exp(z) - 1)/z at z = -p/q, for p >= 0 and q > 0, by the (1, 2) Padé approximant of exp.
 
     The approximant is L-stable (it is that of Radau IIA), exact to z² at 0 and -1/z far from
     it: one step of a stiff equation ends on its equilibrium.
     """
-    return (1.0 - z / 6.0) / (1.0 - z * (2.0 / 3.0) + z * z / 6.0)
+    return q * (q + p * (1.0 / 6.0)) / (q * (q + p * (2.0 / 3.0)) + p * p * (1.0 / 6.0))
 
 
 def advance_excitation(
-    u: float, n: float, a: float, tau_nex: float, tau_act: float, tau_deact: float, dt: float
+    u: float, n: float, a: float, tau_nex: float, tau: float, dt: float
 ) -> tuple[float, float]:
     """Excitation and activation after dt [s] at constant input u.
 
-    n is exact. a is exact for an n that is linear in time over the step.
+    n is exact. a, of time constant tau, is exact for an n that is linear in time over the step.
     """
     n_next = u + (n - u) * exp(-dt / tau_nex)
-    z = dt / (tau_act if n >= a else tau_deact)
-    decay = exp(-z)
+    decay = exp(-dt / tau)
     settled = 1.0 - decay
-    a_next = decay * a + settled * n + (n_next - n) * (1.0 - settled / z)
+    a_next = decay * a + settled * n + (n_next - n) * (1.0 - settled * tau * (1.0 / dt))
     return n_next, a_next
 
 
@@ -68,11 +67,11 @@ def advance_stretch(
     Exponential Rosenbrock-Euler. A slack element is first taken up at its constant rate, so
     that it meets its stiffness when it is taut, not a step later.
     """
-    part = dt / substeps
+    part = dt if substeps == 1 else dt / substeps
     for _ in range(substeps):
         left = part
         if stretch < 0:
-            velocity, _ = contractile_velocity(
+            velocity, _, _ = contractile_velocity(
                 0.0, hypothetical, hill, plateau, slope_ratio, viscosity
             )
             rate = length_rate + max_velocity * velocity
@@ -82,11 +81,11 @@ def advance_stretch(
             left = part + stretch / rate
             stretch = 0.0
         force, stiffness = series_force(stretch, stretch_max, shape, limit)
-        velocity, slope = contractile_velocity(
+        velocity, p, q = contractile_velocity(
             force, hypothetical, hill, plateau, slope_ratio, viscosity
         )
-        z = left * max_velocity * slope * stiffness
-        stretch += left * (length_rate + max_velocity * velocity) * relaxed(z)
+        rate = length_rate + max_velocity * velocity
+        stretch += left * rate * relaxed(left * max_velocity * stiffness * p, q)
     return stretch
 
 
@@ -110,11 +109,11 @@ def capped_stretch_rate(
     is lost is a lag of half a step in an element that carries little force when it is fast.
     """
     force, stiffness = series_force(stretch, stretch_max, shape, limit)
-    velocity, slope = contractile_velocity(
+    velocity, p, q = contractile_velocity(
         force, hypothetical, hill, plateau, slope_ratio, viscosity
     )
-    z = -dt * max_velocity * slope * stiffness
-    return (length_rate + max_velocity * velocity) * (2.0 / z if z > 2.0 else 1.0)
+    p *= dt * max_velocity * stiffness
+    return (length_rate + max_velocity * velocity) * (2.0 * q / p if p > 2.0 * q else 1.0)
 
 
 def muscle_rates(
@@ -157,14 +156,16 @@ def muscle_rates(
     Electrical stimulation puts the input straight into activation (sect. 4.1.2).
     """
     source = u if stimulated > 0 else n
-    a_rate = activation_rate(source, a, tau_act, tau_deact)
+    frequency = 1.0 / dt
     if staged:
-        n_rate = (u - n) / dt if stimulated > 0 else excitation_rate(u, n, tau_nex)
+        n_rate = (u - n) * frequency if stimulated > 0 else excitation_rate(u, n, tau_nex)
+        a_rate = activation_rate(source, a, tau_act, tau_deact)
         a_then, length_then = a, length
     else:
-        a_then, length_then = a - 0.5 * dt * a_rate, length - 0.5 * dt * length_rate
-        n_next, a_next = advance_excitation(u, source, a, tau_nex, tau_act, tau_deact, dt)
-        n_rate, a_rate = (n_next - n) / dt, (a_next - a) / dt
+        tau = tau_act if source >= a else tau_deact
+        a_then, length_then = a - 0.5 * (dt / tau) * (source - a), length - 0.5 * dt * length_rate
+        n_next, a_next = advance_excitation(u, source, a, tau_nex, tau, dt)
+        n_rate, a_rate = (n_next - n) * frequency, (a_next - a) * frequency
     factor = active_length_factor(length_then, optimal, width_short, width_long)
     hypothetical = hypothetical_force(a_then, factor, floor)
     speed = max_velocity * velocity_scale(hypothetical, velocity_share)
@@ -180,7 +181,7 @@ def muscle_rates(
         length - dt * length_rate - s, length_rate, hypothetical, speed, hill, plateau,
         slope_ratio, viscosity, stretch_max, shape, limit, dt, substeps,
     )  # fmt: skip
-    return n_rate, a_rate, (length - stretch - s) / dt
+    return n_rate, a_rate, (length - stretch - s) * frequency
 
 
 def present_length(staged: bool, s: float, s_rate: float, dt: float) -> float:

@@ -37,12 +37,7 @@ from mjhill.callbacks.structs import mujoco_library, offset, verify
 from mjhill.layout import MUSCLE_TAG, NUSER_JNT, PASSIVE_TAG, SLOTS, STATES
 
 _ROW = 8 * 10  # bytes of one actuator's dynprm, gainprm or biasprm
-_JIT: dict[str, Any] = {
-    "error_model": "numpy",
-    "nogil": True,
-    "forceinline": True,
-    "fastmath": {"contract", "arcp", "nsz"},
-}
+_JIT: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True}
 _RK4 = int(mujoco.mjtIntegrator.mjINT_RK4)
 _USER = int(mujoco.mjtDyn.mjDYN_USER)
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
