@@ -1,11 +1,42 @@
-"""Muscles and passive elasticity added to an ``MjSpec``."""
+"""Muscles and passive elasticity added to an ``MjSpec``, and the smallest model of a joint."""
 
 from __future__ import annotations
 
 import mujoco
 
 from mjhill.layout import NUSER_JNT, STATES, parameter_rows, passive_row
-from mjhill.parameters import Muscle, Passive
+from mjhill.parameters import Joint, Muscle, Passive
+
+
+def joint_spec(joint: Joint) -> mujoco.MjSpec:
+    """The smallest model of a joint: one hinge with its inertia, elasticity and muscles.
+
+    No gravity and nothing to see; the same motion as the joint's own model.
+    """
+    spec = mujoco.MjSpec()
+    spec.modelname = joint.name
+    spec.option.timestep = 1e-3
+    spec.option.gravity = [0, 0, 0]
+    spec.compiler.degree = False
+    body = spec.worldbody.add_body(
+        name=joint.name,
+        mass=1,
+        ipos=[0, 0, 0],
+        inertia=[joint.inertia] * 3,
+        explicitinertial=True,
+    )
+    body.add_joint(
+        name=joint.name,
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=[0, 1, 0],
+        damping=joint.damping,
+        stiffness=joint.stiffness,
+        springref=joint.rest_angle,
+    )
+    add_passive(spec, joint=joint.name, passive=joint.passive)
+    for name, muscle in joint.muscles.items():
+        add_muscle(spec, name=name, muscle=muscle, joint=joint.name, gear=joint.gears[name])
+    return spec
 
 
 def add_muscle(

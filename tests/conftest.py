@@ -5,19 +5,13 @@ import pytest
 
 import mjhill
 from mjhill.callbacks.structs import mujoco_library
+from mjhill.spec import joint_spec
 
 CALLBACKS = ("mjcb_act_dyn", "mjcb_act_bias", "mjcb_passive")
 
-PAIR_XML = """
-<mujoco model="pair">
-  <compiler angle="radian"/>
-  <option timestep="0.001" gravity="0 0 0"/>
-  <worldbody>
-    <body>
-      <joint name="elbow" axis="0 1 0" damping="1.2" stiffness="3.4" springref="1.396"/>
-      <inertial pos="0 0 0" mass="1" diaginertia="0.06 0.06 0.06"/>
-    </body>
-  </worldbody>
+PLAIN_XML = """
+<mujoco>
+  <worldbody><body><joint name="elbow"/><geom size="0.1"/></body></worldbody>
 </mujoco>
 """
 
@@ -54,18 +48,9 @@ def muscle(elbow: mjhill.Joint) -> mjhill.Muscle:
     return elbow.muscles["elbow_flexor"]
 
 
-def pair_spec(joint: mjhill.Joint) -> mujoco.MjSpec:
-    """The smallest model of a joint: one body, one hinge, two muscles, passive elasticity."""
-    spec = mujoco.MjSpec.from_string(PAIR_XML)
-    for name, parameters in joint.muscles.items():
-        mjhill.add_muscle(spec, name=name, muscle=parameters, joint="elbow", gear=joint.gears[name])
-    mjhill.add_passive(spec, joint="elbow", passive=joint.passive)
-    return spec
-
-
 @pytest.fixture
 def pair(elbow: mjhill.Joint) -> mujoco.MjModel:
-    return pair_spec(elbow).compile()
+    return joint_spec(elbow).compile()
 
 
 def rest(model: mujoco.MjModel, angle: float = 0.6283, **excitation: float) -> mujoco.MjData:

@@ -5,9 +5,10 @@ import mujoco.batch
 import mujoco.rollout
 import numpy as np
 import pytest
-from conftest import PAIR_XML, pair_spec, rest
+from conftest import PLAIN_XML, rest
 
 import mjhill
+from mjhill.spec import joint_spec
 
 INTEGRATORS = ["EULER", "RK4", "IMPLICIT", "IMPLICITFAST", "DISCRETE"]
 
@@ -84,7 +85,7 @@ def test_every_option_of_the_muscle_is_served_alike_by_both_back_ends(elbow, mus
         muscle, electrical_stimulation=True, velocity_activation=0.6, eccentric_slope_ratio=5.0,
         width_short=0.8, series_limit=1.2, viscosity=0.02, activation_floor=0.01,
     )  # fmt: skip
-    model = pair_spec(
+    model = joint_spec(
         dataclasses.replace(elbow, muscles={**elbow.muscles, "elbow_flexor": unusual})
     )
     model = model.compile()
@@ -111,7 +112,7 @@ def test_forward_twice_gives_the_same_twice_and_changes_no_state(pair, backend):
 
 
 def delayed_spec(elbow, **settings):
-    spec = pair_spec(elbow)
+    spec = joint_spec(elbow)
     for actuator in spec.actuators:
         actuator.delay, actuator.nsample = 0.01, 20
         for name, value in settings.items():
@@ -210,7 +211,7 @@ def test_batch_sweeps_a_parameter_of_the_muscle(pair):
 
 
 def test_rollout_runs_several_models_in_one_process_on_all_threads(pair, elbow):
-    weak = pair_spec(elbow).compile()
+    weak = joint_spec(elbow).compile()
     weak.actuator_gainprm[:, 1] *= 0.5
     models = [pair, weak, pair, weak]
     initial = np.zeros((4, mujoco.mj_stateSize(pair, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
@@ -226,7 +227,7 @@ def test_rollout_runs_several_models_in_one_process_on_all_threads(pair, elbow):
 
 
 def test_a_model_without_muscles_is_untouched():
-    model = mujoco.MjModel.from_xml_string(PAIR_XML)
+    model = mujoco.MjModel.from_xml_string(PLAIN_XML)
     results = []
     for install in (False, True):
         data = mujoco.MjData(model)
@@ -241,7 +242,7 @@ def test_a_model_without_muscles_is_untouched():
 
 
 def test_a_sleeping_tree_gathers_no_passive_torque(elbow):
-    spec = pair_spec(elbow)
+    spec = joint_spec(elbow)
     spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     model = spec.compile()
     for backend in ("python", "compiled"):

@@ -1,8 +1,8 @@
 import mujoco
 import pytest
-from conftest import pair_spec
 
 import mjhill
+from mjhill.spec import joint_spec
 
 
 def flexor(spec):
@@ -23,7 +23,7 @@ def test_a_model_in_order_passes(pair):
     ],
 )
 def test_half_a_muscle_is_refused_with_what_is_missing(elbow, attribute, value, message):
-    spec = pair_spec(elbow)
+    spec = joint_spec(elbow)
     setattr(flexor(spec), attribute, value)
     flexor(spec).actrange = [0, 1]
     model = spec.compile()
@@ -32,7 +32,7 @@ def test_half_a_muscle_is_refused_with_what_is_missing(elbow, attribute, value, 
 
 
 def test_a_tag_on_a_native_actuator_is_refused(elbow):
-    spec = pair_spec(elbow)
+    spec = joint_spec(elbow)
     flexor(spec).dyntype = mujoco.mjtDyn.mjDYN_FILTER
     flexor(spec).actdim = 1
     with pytest.raises(ValueError, match="dyntype is filter, not user"):

@@ -6,10 +6,11 @@ import mujoco
 import mujoco.batch
 import numpy as np
 import pytest
-from conftest import pair_spec, raw_callbacks, rest
+from conftest import raw_callbacks, rest
 
 import mjhill
 from mjhill.callbacks.structs import offset, verify
+from mjhill.spec import joint_spec
 
 ACTUATOR = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
 GENERIC = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
@@ -19,7 +20,7 @@ BACKENDS = ["python", "compiled"]
 @pytest.fixture
 def mixed(elbow):
     """The pair and a foreign user actuator with one state."""
-    spec = pair_spec(elbow)
+    spec = joint_spec(elbow)
     spec.add_actuator(
         name="foreign", target="elbow", trntype=mujoco.mjtTrn.mjTRN_JOINT,
         dyntype=mujoco.mjtDyn.mjDYN_USER, gaintype=mujoco.mjtGain.mjGAIN_FIXED,

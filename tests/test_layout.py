@@ -2,7 +2,7 @@ import dataclasses
 
 import mujoco
 import pytest
-from conftest import PAIR_XML
+from conftest import PLAIN_XML
 
 import mjhill
 from mjhill.layout import RATE_PARAMETERS, SLOTS
@@ -42,7 +42,7 @@ def test_an_unknown_muscle_lists_those_there_are(pair):
 
 
 def test_a_joint_without_passive_elasticity_says_how_to_give_it_one():
-    model = mujoco.MjModel.from_xml_string(PAIR_XML)
+    model = mujoco.MjModel.from_xml_string(PLAIN_XML)
     with pytest.raises(ValueError, match="joint 'elbow' has no mjhill passive elasticity"):
         mjhill.read_passive(model, "elbow")
     with pytest.raises(ValueError, match="unknown joint 'knee'; the model's joints are: elbow"):
@@ -60,19 +60,19 @@ def test_a_joint_without_passive_elasticity_says_how_to_give_it_one():
     ],
 )
 def test_a_muscle_that_cannot_be_added_says_why(muscle, arguments, message):
-    spec = mujoco.MjSpec.from_string(PAIR_XML)
+    spec = mujoco.MjSpec.from_string(PLAIN_XML)
     with pytest.raises(ValueError, match=message):
         mjhill.add_muscle(spec, name="m", muscle=muscle, **arguments)
 
 
 def test_a_second_muscle_of_the_same_name_is_refused(muscle):
-    spec = mujoco.MjSpec.from_string(PAIR_XML)
+    spec = mujoco.MjSpec.from_string(PLAIN_XML)
     mjhill.add_muscle(spec, name="m", muscle=muscle, joint="elbow")
     with pytest.raises(ValueError, match="muscle 'm': the model has an actuator of that name"):
         mjhill.add_muscle(spec, name="m", muscle=muscle, joint="elbow")
 
 
 def test_passive_elasticity_needs_a_scalar_joint(elbow):
-    spec = mujoco.MjSpec.from_string(PAIR_XML.replace('name="elbow"', 'name="elbow" type="ball"'))
+    spec = mujoco.MjSpec.from_string(PLAIN_XML.replace('name="elbow"', 'name="elbow" type="ball"'))
     with pytest.raises(ValueError, match="needs a hinge or slide joint"):
         mjhill.add_passive(spec, joint="elbow", passive=elbow.passive)

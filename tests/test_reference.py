@@ -4,10 +4,10 @@ import math
 import mujoco
 import numpy as np
 import pytest
-from conftest import pair_spec
 
 import mjhill
 from mjhill.reference import rest_state, simulate
+from mjhill.spec import joint_spec
 
 CASES = {
     "step": ({"elbow_flexor": mjhill.step(0.5, 0.05)}, 0.0),
@@ -40,7 +40,7 @@ def start(joint, case):
 
 def run(joint, case, integrator, timestep, duration=0.6):
     excitation, torque = CASES[case]
-    model = pair_spec(joint).compile()
+    model = joint_spec(joint).compile()
     model.opt.timestep = timestep
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
     data = mujoco.MjData(model)

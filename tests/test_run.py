@@ -1,9 +1,10 @@
 import mujoco
 import numpy as np
 import pytest
-from conftest import pair_spec, rest
+from conftest import rest
 
 import mjhill
+from mjhill.spec import joint_spec
 
 
 def test_a_recording_has_every_series_with_its_unit(pair):
@@ -142,6 +143,6 @@ def test_progress_reaches_the_end(pair):
 
 
 def test_a_bare_pair_is_a_model_of_the_joint(elbow):
-    model = pair_spec(elbow).compile()
+    model = joint_spec(elbow).compile()
     assert model.nv == 1
     assert model.na == 6

@@ -1,9 +1,10 @@
 import mujoco
 import numpy as np
 import pytest
-from conftest import pair_spec, rest
+from conftest import rest
 
 import mjhill
+from mjhill.spec import joint_spec
 
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
@@ -47,7 +48,7 @@ def _muscles(model):
 
 
 def test_a_keyframe_holds_the_muscle_states(elbow):
-    spec = pair_spec(elbow)
+    spec = joint_spec(elbow)
     data = rest(spec.compile(), angle=1.0, elbow_flexor=0.3)
     spec.add_key(name="held", qpos=data.qpos, act=data.act, ctrl=data.ctrl)
     model = spec.compile()
@@ -77,9 +78,9 @@ def test_equilibrate_refuses_a_control_that_is_not_finite(pair):
 
 
 def test_lengths_are_measured_from_qpos0_whatever_the_reference_angle(elbow):
-    spec = pair_spec(elbow)
+    spec = joint_spec(elbow)
     plain = spec.compile()
-    shifted_spec = pair_spec(elbow)
+    shifted_spec = joint_spec(elbow)
     shifted_spec.joints[0].ref = 0.4
     shifted_spec.joints[0].springref = float(shifted_spec.joints[0].springref) + 0.4
     shifted = shifted_spec.compile()

@@ -23,7 +23,10 @@ _DRIVE = 0.3  # control of the muscle that is on, the others are at a tenth of i
 
 @dataclass(frozen=True)
 class StepCost:
-    """Medians of what a step takes [µs], and their half interquartile ranges.
+    """Medians over the rounds of what a step takes [µs], and their half interquartile ranges.
+
+    What a muscle adds and the ratio are taken within each round, where the machine's speed is
+    the same, and their medians after that.
 
     Attributes:
         bare: With motors in the place of the muscles.
@@ -32,6 +35,9 @@ class StepCost:
         bare_spread: Half of the interquartile range of ``bare``.
         native_spread: The same of ``native``.
         mjhill_spread: The same of ``mjhill``.
+        native_per_muscle: What one of MuJoCo's muscles adds to the bare step [µs].
+        mjhill_per_muscle: What one of ours adds [µs].
+        ratio: A whole step with our muscles over one with MuJoCo's [-].
         muscles: Muscles in the model.
         rounds: Timed blocks of each model.
         steps: Steps in a block.
@@ -45,38 +51,25 @@ class StepCost:
     bare_spread: float
     native_spread: float
     mjhill_spread: float
+    native_per_muscle: float
+    mjhill_per_muscle: float
+    ratio: float
     muscles: int
     rounds: int
     steps: int
     backend: Backend
     integrator: str
 
-    @property
-    def native_per_muscle(self) -> float:
-        """What one of MuJoCo's muscles adds to the bare step [µs]."""
-        return (self.native - self.bare) / self.muscles
-
-    @property
-    def mjhill_per_muscle(self) -> float:
-        """What one of our muscles adds to the bare step [µs]."""
-        return (self.mjhill - self.bare) / self.muscles
-
-    @property
-    def ratio(self) -> float:
-        """A whole step with our muscles over one with MuJoCo's [-]."""
-        return self.mjhill / self.native
-
     def as_dict(self) -> dict[str, Any]:
-        """All of it, what follows included, as what JSON can hold."""
-        derived = ("native_per_muscle", "mjhill_per_muscle", "ratio")
-        return {**asdict(self), **{name: getattr(self, name) for name in derived}}
+        """All of it, as what JSON can hold."""
+        return asdict(self)
 
 
 def step_cost(
     model: str | Path = "elbow",
     *,
-    rounds: int = 400,
-    steps: int = 500,
+    rounds: int = 1000,
+    steps: int = 200,
     backend: Backend = "compiled",
     integrator: str | None = None,
     progress: Callable[[float], None] | None = None,
@@ -113,10 +106,15 @@ def step_cost(
     low, middle, high = np.quantile(per_step, [0.25, 0.5, 0.75], axis=0).tolist()
     names = ("bare", "native", "mjhill")
     spreads = [0.5 * (top - bottom) for top, bottom in zip(high, low, strict=True)]
+    muscles = len(muscle_names(models[-1]))
+    bare, native, ours = per_step.T
     return StepCost(
         **dict(zip(names, middle, strict=True)),
         **dict(zip([f"{name}_spread" for name in names], spreads, strict=True)),
-        muscles=len(muscle_names(models[-1])),
+        native_per_muscle=float(np.median(native - bare)) / muscles,
+        mjhill_per_muscle=float(np.median(ours - bare)) / muscles,
+        ratio=float(np.median(ours / native)),
+        muscles=muscles,
         rounds=rounds,
         steps=steps,
         backend=backend,

@@ -1,0 +1,87 @@
+"""Video: frames per second against MuJoCo's renderer alone, and memory against length."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import tempfile
+import time
+from pathlib import Path
+
+import mujoco
+
+from mjhill.bench.result import Result
+from mjhill.recording import Recording
+from mjhill.rendering import View, render
+from mjhill.scripted import run
+
+SIZE, FPS, ROUNDS = (1280, 720), 30, 5
+SHORT, LONG = 5.0, 60.0  # of film [s]
+_PAGE = os.sysconf("SC_PAGE_SIZE")
+
+
+def measure() -> Result:
+    """Frame rates, interleaved, and resident memory while the last frame is made."""
+    model, recording = run("elbow", {}, {}, duration=4.0)
+    frames = round(FPS * recording.time[-1])
+    alone, ours = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "film.mp4"
+        for _ in range(ROUNDS):
+            alone.append(frames / _render_alone(model, recording, frames))
+            start = time.perf_counter()
+            render(View(model, recording), path, fps=FPS, size=SIZE)
+            ours.append(frames / (time.perf_counter() - start))
+        memory = {length: _memory(model, recording, length, path) for length in (SHORT, LONG)}
+    rates = {
+        "MuJoCo's renderer alone": statistics.median(alone),
+        "mjhill: film with curves, encoded, start and end included": statistics.median(ours),
+    }
+    base = statistics.median(alone)
+    rows = [
+        {"what": what, "value": rate, "unit": "frames/s", "share of renderer": rate / base}
+        for what, rate in rates.items()
+    ]
+    rows += [
+        {
+            "what": f"memory at the end of {length:g} s of film",
+            "value": size,
+            "unit": "MiB",
+            "share of renderer": None,
+        }
+        for length, size in memory.items()
+    ]
+    notes = (
+        f"elbow, {SIZE[0]}x{SIZE[1]}, {frames} frames, {ROUNDS} rounds A B A B ..., medians",
+        "goal: at least 0.9 of the renderer alone; memory does not grow with length",
+    )
+    return Result("Video", rows, notes)
+
+
+def _render_alone(model: mujoco.MjModel, recording: Recording, frames: int) -> float:
+    """Seconds in which MuJoCo's renderer makes the same frames and throws them away."""
+    model.vis.global_.offwidth, model.vis.global_.offheight = SIZE
+    data = mujoco.MjData(model)
+    angles = recording["elbow.angle"][:: len(recording) // frames][:frames]
+    start = time.perf_counter()
+    with mujoco.Renderer(model, SIZE[1], SIZE[0]) as renderer:
+        for angle in angles:
+            data.qpos[0] = angle
+            mujoco.mj_fwdPosition(model, data)
+            renderer.update_scene(data, camera="side")
+            renderer.render()
+    return time.perf_counter() - start
+
+
+def _memory(model: mujoco.MjModel, recording: Recording, length: float, path: Path) -> float:
+    """Resident memory [MiB] at the last frame of a film in slow motion of that length."""
+    seen: list[float] = []
+
+    def progress(done: int, total: int) -> None:
+        if done >= total - 1:
+            resident = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+            seen.append(resident * _PAGE / 2**20)
+
+    speed = float(recording.time[-1]) / length
+    render(View(model, recording), path, fps=FPS, size=(640, 360), speed=speed, progress=progress)
+    return seen[-1]
