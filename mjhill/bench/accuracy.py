@@ -57,12 +57,11 @@ def _row(
         "u": level,
         "movement": f"{np.degrees(movement):.0f}°",
         "muscle": muscle,
-        "integrator": integrator.removeprefix("mjINT_").lower(),
+        "integrator": _short(integrator),
     }
     for timestep in TIMESTEPS:
-        found = angles(model, integrator, timestep, level)
-        error = float(np.abs(found - truth[:: round(timestep / _GRID)]).max())
-        cell = f"{np.degrees(error):.2g}° ({100 * error / movement:.2g} %)"
+        worst = error(model, integrator, timestep, level, truth)
+        cell = f"{np.degrees(worst):.2g}° ({100 * worst / movement:.2g} %)"
         row[f"{1e3 * timestep:g} ms"] = cell
     return row
 
@@ -81,3 +80,44 @@ def angles(model: mujoco.MjModel, integrator: str, timestep: float, level: float
             mujoco.mj_step(model, data)
             result[step + 1] = data.qpos[0]
     return result
+
+
+def brief(level: float = 0.5) -> list[tuple[str, float, float]]:
+    """Errors at 1 and 5 ms in percent of the movement, by muscle and integrator, at one level."""
+    from mjhill.comparison import native_model
+
+    joint = JOINTS["elbow"]
+    ours, native = load(joint.name), native_model(joint.name)
+    agonist = next(iter(joint.muscles))
+    exact = simulate(joint, {agonist: level}, duration=DURATION, sample=_GRID)
+    truth = exact[f"{joint.name}.angle"]
+    rows = []
+    for integrator in ("mjINT_EULER", "mjINT_IMPLICITFAST", "mjINT_DISCRETE", "mjINT_RK4"):
+        rows.append(("mjhill, " + _short(integrator), *_percent(ours, integrator, level, truth)))
+    for integrator in ("mjINT_EULER", "mjINT_IMPLICITFAST"):
+        fine = angles(native, integrator, FINE, level)[:: round(_GRID / FINE)]
+        rows.append(("native, " + _short(integrator), *_percent(native, integrator, level, fine)))
+    return rows
+
+
+def _percent(
+    model: mujoco.MjModel, integrator: str, level: float, truth: _Angles
+) -> tuple[float, float]:
+    movement = float(np.ptp(truth))
+    at_1_ms, at_5_ms = (
+        100 * error(model, integrator, timestep, level, truth) / movement
+        for timestep in (1e-3, 5e-3)
+    )
+    return at_1_ms, at_5_ms
+
+
+def error(
+    model: mujoco.MjModel, integrator: str, timestep: float, level: float, truth: _Angles
+) -> float:
+    """Largest angle error [rad] against a truth sampled every 0.5 ms."""
+    found = angles(model, integrator, timestep, level)
+    return float(np.abs(found - truth[:: round(timestep / _GRID)]).max())
+
+
+def _short(integrator: str) -> str:
+    return integrator.removeprefix("mjINT_").lower()
