@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 READY := $(VENV)/.ready
 RUN := $(VENV)/bin
+export VENV
 
 .PHONY: demo test check format setup clean
 

@@ -33,13 +33,22 @@ def equilibrate(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     Raises:
         ValueError: A control or a position is not finite.
     """
-    for what in ("ctrl", "qpos"):
-        for index, value in enumerate(getattr(data, what).tolist()):
-            if not math.isfinite(value):
-                raise ValueError(f"data.{what}[{index}] must be finite, got {value}")
+    check_finite(data)
     mujoco.mj_fwdPosition(model, data)
     for name, address in addresses(model):
         u = control(model, data, address.actuator)
         length = muscle_length(model, data, address.actuator)
         stretch = steady_stretch(read_muscle(model, name), u, length)
         data.act[address.act : address.act + 3] = u, u, length - stretch
+
+
+def check_finite(data: mujoco.MjData) -> None:
+    """Refuse data whose controls or positions are not numbers.
+
+    Raises:
+        ValueError: One is not finite; the message has its index.
+    """
+    for what in ("ctrl", "qpos"):
+        for index, value in enumerate(getattr(data, what).tolist()):
+            if not math.isfinite(value):
+                raise ValueError(f"data.{what}[{index}] must be finite, got {value}")

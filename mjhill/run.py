@@ -10,6 +10,7 @@ import numpy as np
 
 from mjhill.callbacks.python import control, muscle_length, series_stretch
 from mjhill.checks import check_model
+from mjhill.equilibrium import check_finite
 from mjhill.install import installed_backend
 from mjhill.layout import address, is_muscle, joint_id, read_muscle, turns
 from mjhill.readings import shortening_velocity, tension
@@ -63,6 +64,7 @@ def record(
     if every < 1:
         raise ValueError(f"every must be at least 1 step, got {every}")
     _require_callbacks(model)
+    check_finite(data)
     actuators = [model.actuator(i).name for i in range(model.nactuator)]
     inputs = as_signals(excitation or {}, actuators, "actuator")
     loads = as_signals(torque or {}, _scalar_joints(model), "hinge or slide joint")
@@ -78,7 +80,7 @@ def record(
             table[step // every] = [data.time, *(read(data) for _, _, read in readers)]
         if step < steps:
             mujoco.mj_step(model, data)
-            _check_warnings(data)
+            check_warnings(data)
         if progress is not None and step % 256 == 0:
             progress(step / steps)
     columns = np.ascontiguousarray(table.T)
@@ -207,7 +209,12 @@ def _refresh(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     mujoco.mj_forward(model, data)
 
 
-def _check_warnings(data: mujoco.MjData) -> None:
+def check_warnings(data: mujoco.MjData) -> None:
+    """Refuse data in which MuJoCo warned: it resets a state that went bad and goes on.
+
+    Raises:
+        RuntimeError: A warning was counted; the message has its name and the time.
+    """
     for index, warning in enumerate(data.warning):
         if warning.number:
             name = mujoco.mjtWarning(index).name.removeprefix("mjWARN_").lower()

@@ -103,6 +103,13 @@ def test_a_run_with_bad_input_says_what_is_wrong(pair, arguments, message):
         mjhill.record(pair, rest(pair), **{"duration": 0.1, **arguments})
 
 
+def test_a_control_that_is_not_finite_is_named_before_the_run(pair):
+    data = rest(pair)
+    data.ctrl[1] = np.nan
+    with mjhill.installed(), pytest.raises(ValueError, match=r"data.ctrl\[1\] must be finite"):
+        mjhill.record(pair, data, duration=0.1)
+
+
 @pytest.mark.parametrize("bad", [float("nan"), float("inf")])
 def test_an_input_that_turns_bad_names_itself_and_its_time(pair, bad):
     signal = mjhill.Signal(lambda t: bad if t > 0.02 else 0.1)

@@ -94,7 +94,7 @@ def test_lengths_are_measured_from_qpos0_whatever_the_reference_angle(elbow):
     np.testing.assert_allclose(forces[0], forces[1], rtol=1e-10)
 
 
-@pytest.mark.parametrize("integrator", ["EULER", "IMPLICIT", "IMPLICITFAST"])
+@pytest.mark.parametrize("integrator", ["EULER", "IMPLICIT", "IMPLICITFAST", "DISCRETE"])
 def test_transition_derivatives_are_those_of_the_whole_step(pair, integrator):
     pair.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
     data = rest(pair, angle=1.0, elbow_flexor=0.4, elbow_extensor=0.2)
