@@ -262,6 +262,6 @@ def _global(name: str) -> ctypes.c_void_p:
 
 @cache
 def _compiled() -> Any:
-    from mjhill.callbacks.compiled import build
+    from mjhill.callbacks.machine_code import build
 
     return build()

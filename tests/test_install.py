@@ -1,4 +1,5 @@
 import ctypes
+import os
 import subprocess
 import sys
 
@@ -207,6 +208,35 @@ def test_import_leaves_numba_and_plotting_out():
     assert run.stdout.strip() == "[]"
 
 
+def test_machine_code_is_kept_and_runs_without_the_compiler(tmp_path):
+    code = (
+        "import sys, mjhill, mujoco\n"
+        "m = mjhill.load('elbow'); d = mujoco.MjData(m)\n"
+        "with mjhill.installed():\n d.ctrl[0] = 1; mujoco.mj_step(m, d, nstep=100)\n"
+        "print('numba' in sys.modules, d.qpos[0])"
+    )
+
+    def run():
+        environment = {**os.environ, "MJHILL_CACHE_DIR": str(tmp_path / "cache")}
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            env=environment,
+            check=True,
+        )
+        return done.stdout.split()
+
+    compiled, cached = run(), run()
+    (kept,) = (tmp_path / "cache").iterdir()
+    kept.write_bytes(kept.read_bytes()[:1000])
+    damaged, again = run(), run()
+    assert [line[0] for line in (compiled, cached, damaged, again)] == [
+        "True", "False", "True", "False",
+    ]  # fmt: skip
+    assert len({line[1] for line in (compiled, cached, damaged, again)}) == 1
+
+
 def test_a_read_only_home_still_compiles(tmp_path):
     code = (
         "import mjhill, mujoco\n"
@@ -214,7 +244,7 @@ def test_a_read_only_home_still_compiles(tmp_path):
         "with mjhill.installed():\n d.ctrl[0] = 1; mujoco.mj_step(m, d, nstep=10)\n"
         "print(d.act[0] > 0)"
     )
-    environment = {"PATH": "", "NUMBA_CACHE_DIR": "/proc/no/such/place", "HOME": "/proc/no"}
+    environment = {"PATH": "", "MJHILL_CACHE_DIR": "/proc/no/such/place", "HOME": "/proc/no"}
     run = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False
     )

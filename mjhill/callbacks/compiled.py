@@ -1,27 +1,21 @@
-"""The callbacks compiled to C functions: the same equations, no interpreter, no lock.
+"""The callbacks as numba compiles them: the same equations, no interpreter, no lock.
 
-Importing this module imports numba; ``install`` does so when the compiled back-end is asked for.
+Importing this module imports numba; ``machine_code`` does so when there is nothing in its cache.
 Each call is a pure function of model and data, so they serve any number of threads.
 """
 
 from __future__ import annotations
 
-import ctypes
-import hashlib
 import inspect
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
-import llvmlite.binding as llvm
 import mujoco
 import numba
 
-from mjhill import elements, layout, scheme
-from mjhill.callbacks import intrinsics
+from mjhill import elements, scheme
 from mjhill.callbacks.intrinsics import (
     chained_act_bias,
     chained_act_dyn,
@@ -33,7 +27,7 @@ from mjhill.callbacks.intrinsics import (
     read_delayed_control,
     store_double,
 )
-from mjhill.callbacks.structs import mujoco_library, offset, verify
+from mjhill.callbacks.structs import offset
 from mjhill.layout import MUSCLE_TAG, NUSER_JNT, PASSIVE_TAG, SLOTS, STATES
 
 _ROW = 8 * 10  # bytes of one actuator's dynprm, gainprm or biasprm
@@ -44,17 +38,6 @@ _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 _CLAMP_DISABLED = int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
 _MAXVAL = float(mujoco.mjMAXVAL)
-
-
-@dataclass(frozen=True)
-class CompiledCallbacks:
-    """Addresses of the three C functions, and the table of those they pass on to."""
-
-    act_dyn: int
-    act_bias: int
-    passive: int
-    chain: Any  # ctypes array of three pointers
-    keep: tuple[Any, ...]  # what owns the machine code
 
 
 def _compile_equations(*modules: ModuleType) -> dict[str, Callable[..., Any]]:
@@ -75,47 +58,12 @@ present_length = _equations["present_length"]
 passive_torque = _equations["passive_torque"]
 
 
-def _fingerprint() -> int:
-    """A number for all that the machine code depends on and numba's cache does not look at."""
-    digest = hashlib.sha256(f"{mujoco.__version__} {numba.__version__}".encode())
-    for module in (elements, scheme, layout, intrinsics):
-        digest.update(Path(inspect.getfile(module)).read_bytes())
-    return int.from_bytes(digest.digest()[:7], "big")
-
-
 def _slot(name: str) -> int:
     return 8 * SLOTS[name][1]
 
 
-FIELDS = [
-    *(f"mjModel.opt.{name}" for name in ("timestep", "integrator", "disableflags")),
-    *(f"mjModel.actuator_{name}" for name in ("dyntype", "ctrladr", "outadr", "actadr", "actnum")),
-    *(f"mjModel.actuator_{name}" for name in ("dynprm", "gainprm", "biasprm", "length0")),
-    *(f"mjModel.actuator_{name}" for name in ("ctrllimited", "ctrlrange", "delay", "history")),
-    *(f"mjModel.{name}" for name in ("njnt", "nuser_jnt", "jnt_user", "jnt_type", "jnt_qposadr")),
-    *(f"mjModel.{name}" for name in ("jnt_dofadr", "dof_treeid", "qpos_spring")),
-    *(f"mjData.{name}" for name in ("time", "ctrl", "act", "act_dot", "qpos", "qfrc_passive")),
-    *(f"mjData.{name}" for name in ("actuator_length", "actuator_velocity", "tree_awake")),
-]
-
-
-def _cfunc(result: Any, arguments: tuple[Any, ...]) -> Callable[[Callable[..., Any]], Any]:
-    """``numba.cfunc`` that caches on disk where there is a place to."""
-
-    def compile_(function: Callable[..., Any]) -> Any:
-        signature = result(*arguments)
-        try:
-            return numba.cfunc(signature, cache=True, **_JIT)(function)
-        except RuntimeError as error:
-            if "no locator available" not in str(error):
-                raise
-            return numba.cfunc(signature, **_JIT)(function)
-
-    return compile_
-
-
-_ACTUATOR = (numba.float64, (numba.int64, numba.int64, numba.int32))
-_GENERIC = (numba.void, (numba.int64, numba.int64))
+_ACTUATOR = numba.float64(numba.int64, numba.int64, numba.int32)
+_GENERIC = numba.void(numba.int64, numba.int64)
 
 
 def _make_control() -> Any:
@@ -147,11 +95,10 @@ def _make_control() -> Any:
     return control
 
 
-_key = _fingerprint()
 _control = _make_control()
 
 
-def _make_act_dyn(key: int) -> Any:
+def _make_act_dyn() -> Any:
     m_dynprm, m_gainprm = offset("mjModel.actuator_dynprm"), offset("mjModel.actuator_gainprm")
     m_biasprm, m_actnum = offset("mjModel.actuator_biasprm"), offset("mjModel.actuator_actnum")
     m_actadr, m_outadr = offset("mjModel.actuator_actadr"), offset("mjModel.actuator_outadr")
@@ -168,12 +115,12 @@ def _make_act_dyn(key: int) -> Any:
     plateau, slope_ratio = _slot("eccentric_plateau"), _slot("eccentric_slope_ratio")
     viscosity, share = _slot("viscosity"), _slot("velocity_activation")
 
-    @_cfunc(*_ACTUATOR)
+    @numba.cfunc(_ACTUATOR, **_JIT)
     def act_dyn(m: int, d: int, actuator: int) -> float:
         i = numba.int64(actuator)
         dyn = load_pointer(m + m_dynprm) + _ROW * i
         actnum = load_int(load_pointer(m + m_actnum) + 4 * i)
-        if load_double(dyn) != MUSCLE_TAG or actnum != STATES or d == key:
+        if load_double(dyn) != MUSCLE_TAG or actnum != STATES:
             return chained_act_dyn(m, d, actuator)
         gain = load_pointer(m + m_gainprm) + _ROW * i
         bias = load_pointer(m + m_biasprm) + _ROW * i
@@ -217,7 +164,7 @@ def _make_act_dyn(key: int) -> Any:
     return act_dyn
 
 
-def _make_act_bias(key: int) -> Any:
+def _make_act_bias() -> Any:
     m_dyntype, m_dynprm = offset("mjModel.actuator_dyntype"), offset("mjModel.actuator_dynprm")
     m_gainprm, m_actnum = offset("mjModel.actuator_gainprm"), offset("mjModel.actuator_actnum")
     m_actadr, m_outadr = offset("mjModel.actuator_actadr"), offset("mjModel.actuator_outadr")
@@ -228,13 +175,13 @@ def _make_act_bias(key: int) -> Any:
     stretch_max, shape, limit = map(_slot, ("series_stretch", "series_shape", "series_limit"))
     max_force = _slot("max_isometric_force")
 
-    @_cfunc(*_ACTUATOR)
+    @numba.cfunc(_ACTUATOR, **_JIT)
     def act_bias(m: int, d: int, actuator: int) -> float:
         i = numba.int64(actuator)
         tag = load_double(load_pointer(m + m_dynprm) + _ROW * i)
         actnum = load_int(load_pointer(m + m_actnum) + 4 * i)
         dyntype = load_int(load_pointer(m + m_dyntype) + 4 * i)
-        if tag != MUSCLE_TAG or actnum != STATES or dyntype != _USER or d == key:
+        if tag != MUSCLE_TAG or actnum != STATES or dyntype != _USER:
             return chained_act_bias(m, d, actuator)
         gain = load_pointer(m + m_gainprm) + _ROW * i
         out = 8 * numba.int64(load_int(load_pointer(m + m_outadr) + 4 * i))
@@ -260,23 +207,24 @@ def _make_act_bias(key: int) -> Any:
     return act_bias
 
 
-def _make_passive(key: int) -> Any:
+def _make_passive() -> Any:
     m_njnt, m_nuser, m_user = map(offset, ("mjModel.njnt", "mjModel.nuser_jnt", "mjModel.jnt_user"))
     m_type, m_qposadr = offset("mjModel.jnt_type"), offset("mjModel.jnt_qposadr")
     m_dofadr, m_treeid = offset("mjModel.jnt_dofadr"), offset("mjModel.dof_treeid")
     m_spring, d_awake = offset("mjModel.qpos_spring"), offset("mjData.tree_awake")
     d_qpos, d_passive = offset("mjData.qpos"), offset("mjData.qfrc_passive")
 
-    @_cfunc(*_GENERIC)
+    @numba.cfunc(_GENERIC, **_JIT)
     def passive(m: int, d: int) -> None:
         chained_passive(m, d)
         nuser = load_pointer(m + m_nuser)
-        if nuser < NUSER_JNT or d == key:
+        if nuser < NUSER_JNT:
             return
         for joint in range(load_pointer(m + m_njnt)):
             user = load_pointer(m + m_user) + 8 * nuser * joint
             kind = load_int(load_pointer(m + m_type) + 4 * joint)
-            if load_double(user) != PASSIVE_TAG or kind not in (_SLIDE, _HINGE):
+            scalar = kind == _SLIDE or kind == _HINGE  # noqa: PLR1714 (numba's `in` can raise)
+            if load_double(user) != PASSIVE_TAG or not scalar:
                 continue
             dof = numba.int64(load_int(load_pointer(m + m_dofadr) + 4 * joint))
             tree = numba.int64(load_int(load_pointer(m + m_treeid) + 4 * dof))
@@ -299,34 +247,15 @@ def _make_passive(key: int) -> Any:
     return passive
 
 
-def build() -> CompiledCallbacks:
-    """Compile the callbacks, or load them from numba's cache.
-
-    Raises:
-        RuntimeError: MuJoCo's structs are not laid out as its headers say.
-    """
-    _verify_structs()
-    chain = (ctypes.c_void_p * 3)()
-    llvm.add_symbol(intrinsics.CHAIN_SYMBOL, ctypes.addressof(chain))
-    read_control = ctypes.cast(mujoco_library().mj_readCtrl, ctypes.c_void_p).value
-    llvm.add_symbol("mj_readCtrl", read_control)
-    functions = (
-        _make_act_dyn(_key),
-        _make_act_bias(_key),
-        _make_passive(_key),
-    )
-    act_dyn, act_bias, passive = (function.address for function in functions)
-    return CompiledCallbacks(act_dyn, act_bias, passive, chain, functions)
-
-
-def _verify_structs() -> None:
-    model = mujoco.MjModel.from_xml_string(
-        """<mujoco><option timestep="0.00123" integrator="implicitfast">
-          <flag clampctrl="disable"/></option><size nuser_jnt="7"/>
-        <worldbody><body><joint name="j" ref="0.1"/><geom size="0.1"/></body></worldbody>
-        <actuator><motor joint="j" delay="0.01" nsample="10"/>
-          <general joint="j" dyntype="filter"/></actuator></mujoco>"""
-    )
-    data = mujoco.MjData(model)
-    data.time = 0.5
-    verify(model, data, FIELDS)
+def compile_callbacks() -> dict[str, tuple[str, bytes]]:
+    """Symbol and object code of each callback, by its name in MuJoCo less ``mjcb_``."""
+    functions = {
+        "act_dyn": _make_act_dyn(),
+        "act_bias": _make_act_bias(),
+        "passive": _make_passive(),
+    }
+    code = {}
+    for name, function in functions.items():
+        _, _, (object_code, _) = function._library.serialize_using_object_code()
+        code[name] = (function.native_name, object_code)
+    return code

@@ -8,10 +8,11 @@ from llvmlite import ir
 from numba import extending, types
 from numba.core import cgutils
 
+from mjhill.callbacks.machine_code import CHAIN_SYMBOL, READ_CONTROL
+
 intrinsic: Any = extending.intrinsic  # its wrappers are called without the typing context
 
 _F64, _I64, _I32, _I8 = ir.DoubleType(), ir.IntType(64), ir.IntType(32), ir.IntType(8)
-CHAIN_SYMBOL = "mjhill_chained_callbacks"  # three pointers: act_dyn, act_bias, passive
 
 
 def _loader(llvm_type: ir.Type, numba_type: Any) -> Any:
@@ -99,7 +100,7 @@ def read_delayed_control(
         result = cgutils.alloca_once_value(builder, _F64(0.0))
         pointer = _F64.as_pointer()
         kind = ir.FunctionType(pointer, [_I64, _I64, _I32, _F64, pointer, _I32])
-        function = cgutils.get_or_insert_function(builder.module, kind, "mj_readCtrl")
+        function = cgutils.get_or_insert_function(builder.module, kind, READ_CONTROL)
         found = builder.call(function, [m, d, i, t, result, order])
         builder.store(
             builder.load(builder.select(cgutils.is_null(builder, found), result, found)), result

@@ -23,6 +23,19 @@ _SCALARS = {
 }
 
 
+# the fields that the compiled callbacks read and write
+FIELDS = [
+    *(f"mjModel.opt.{name}" for name in ("timestep", "integrator", "disableflags")),
+    *(f"mjModel.actuator_{name}" for name in ("dyntype", "ctrladr", "outadr", "actadr", "actnum")),
+    *(f"mjModel.actuator_{name}" for name in ("dynprm", "gainprm", "biasprm", "length0")),
+    *(f"mjModel.actuator_{name}" for name in ("ctrllimited", "ctrlrange", "delay", "history")),
+    *(f"mjModel.{name}" for name in ("njnt", "nuser_jnt", "jnt_user", "jnt_type", "jnt_qposadr")),
+    *(f"mjModel.{name}" for name in ("jnt_dofadr", "dof_treeid", "qpos_spring")),
+    *(f"mjData.{name}" for name in ("time", "ctrl", "act", "act_dot", "qpos", "qfrc_passive")),
+    *(f"mjData.{name}" for name in ("actuator_length", "actuator_velocity", "tree_awake")),
+]
+
+
 @cache
 def mujoco_library() -> ctypes.CDLL:
     """The MuJoCo library that the Python package has loaded."""
@@ -107,3 +120,21 @@ def verify(model: mujoco.MjModel, data: mujoco.MjData, paths: list[str]) -> None
                 f"MuJoCo {mujoco.__version__} keeps {path} elsewhere than its headers say; "
                 'the compiled muscle cannot run: use backend="python" and report this'
             )
+
+
+def verify_fields() -> None:
+    """Check every field of ``FIELDS`` against a small model.
+
+    Raises:
+        RuntimeError: As ``verify``.
+    """
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><option timestep="0.00123" integrator="implicitfast">
+          <flag clampctrl="disable"/></option><size nuser_jnt="7"/>
+        <worldbody><body><joint name="j" ref="0.1"/><geom size="0.1"/></body></worldbody>
+        <actuator><motor joint="j" delay="0.01" nsample="10"/>
+          <general joint="j" dyntype="filter"/></actuator></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    data.time = 0.5
+    verify(model, data, FIELDS)
