@@ -104,8 +104,6 @@ def uninstall() -> None:
         installation = _stack.pop()
         replaced = _replaced(installation)
         _restore(installation.before)
-        if installation.backend == "compiled" and _stack:
-            _reinstate_chain()
     if replaced:
         raise RuntimeError(
             f"{_listed(replaced)} replaced while mjhill was installed, and now removed; "
@@ -210,12 +208,6 @@ def _callable(name: str, slot: _Slot) -> Callable[..., Any] | None:
         return slot.holder  # type: ignore[no-any-return]
     function = _TYPES[name](slot.pointer)
     return lambda model, data, *actuator: function(model._address, data._address, *actuator)
-
-
-def _reinstate_chain() -> None:
-    """Point the compiled callbacks' chain at what stood before the first installation."""
-    for index, name in enumerate(_NAMES):
-        _compiled().chain[index] = _stack[0].before[name].pointer
 
 
 def _read(name: str) -> _Slot:
