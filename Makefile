@@ -1,11 +1,12 @@
 # make demo, make test: set everything up, then do it. make check: format, lint, types.
+# make models: write the parameters of mjhill/data/joints.toml into models/.
 PYTHON ?= python3
 VENV ?= .venv
 READY := $(VENV)/.ready
 RUN := $(VENV)/bin
 export VENV
 
-.PHONY: demo test check format setup clean
+.PHONY: demo test check format models setup clean
 
 demo: $(READY)
 	@.ci/graphics
@@ -23,6 +24,9 @@ check: $(READY)
 format: $(READY)
 	@$(RUN)/ruff format .
 	@$(RUN)/ruff check --fix .
+
+models: $(READY)
+	@$(RUN)/python -m mjhill.mjcf models
 
 setup: $(READY)
 

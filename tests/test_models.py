@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 import mjhill
+from mjhill.mjcf import parameters_xml
 from mjhill.reference import rest_state
 
 
@@ -19,6 +20,12 @@ def test_a_model_carries_the_parameters_of_its_joint(name):
     assert model.jnt_stiffness[hinge.id] == joint.stiffness
     assert model.qpos_spring[hinge.qposadr[0]] == pytest.approx(joint.rest_angle)
     assert not model.jnt_limited[hinge.id]
+
+
+@pytest.mark.parametrize("name", list(mjhill.JOINTS))
+def test_the_parameters_of_a_model_are_made_from_the_parameter_file(name):
+    committed = mjhill.model_path(name).with_name("parameters.xml").read_text(encoding="utf-8")
+    assert committed == parameters_xml(mjhill.JOINTS[name]), "run `make models`"
 
 
 @pytest.mark.parametrize("name", list(mjhill.JOINTS))
