@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 _OUT = Path("out")
+_SUFFIXES = {"recording": (".csv", ".npz"), "plot": (".png",), "video": (".mp4", ".gif")}
 Progress = Callable[[float], None]
 
 
@@ -206,7 +207,10 @@ def _film(
     from mjhill import scripted
     from mjhill.files import check_writable
 
-    for path in files.values():
+    for kind, path in files.items():
+        if path.suffix not in _SUFFIXES[kind]:
+            wanted = " or ".join(_SUFFIXES[kind])
+            raise ValueError(f"{kind} {str(path)!r} must end in {wanted}")
         check_writable(path)
     with _progress("running") as progress:
         loaded, recording = scripted.run(model, excitation, torque or {}, duration, progress)
@@ -265,7 +269,8 @@ def _progress(what: str) -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import Progress as Bars
 
-    with Bars(console=Console(stderr=True), transient=True) as bars:
+    console = Console(stderr=True)
+    with Bars(console=console, transient=True, disable=not console.is_terminal) as bars:
         bar = bars.add_task(what, total=1.0)
         yield lambda share: bars.update(bar, completed=share)
 

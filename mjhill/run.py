@@ -61,6 +61,10 @@ def record(
     check_model(model)
     if not (np.isfinite(duration) and duration > 0):
         raise ValueError(f"duration must be positive, got {duration} s")
+    timestep = float(model.opt.timestep)
+    steps = round(duration / timestep)
+    if steps < 1:
+        raise ValueError(f"duration must be at least a timestep, {timestep:g} s, got {duration} s")
     if every < 1:
         raise ValueError(f"every must be at least 1 step, got {every}")
     _require_callbacks(model)
@@ -69,8 +73,6 @@ def record(
     inputs = as_signals(excitation or {}, actuators, "actuator")
     loads = as_signals(torque or {}, _scalar_joints(model), "hinge or slide joint")
     apply = _inputs(model, inputs, loads)
-    timestep = float(model.opt.timestep)
-    steps = round(duration / timestep)
     readers = _readers(model, list(loads))
     table = np.empty((steps // every + 1, len(readers) + 1))
     for step in range(steps + 1):

@@ -75,6 +75,8 @@ def test_run_writes_a_recording_and_says_where(tmp_path):
         (("run", "elbow", "-e", "elbow_flexor=0.5@0.3:0.1"), "must read NAME=LEVEL"),
         (("run", "elbow", "-e", "biceps=0.5"), "unknown actuator 'biceps'"),
         (("run", "elbow", "-d", "-1"), "duration must be positive, got -1.0 s"),
+        (("run", "elbow", "-o", "run.txt"), "recording 'run.txt' must end in .csv or .npz"),
+        (("video", "elbow", "-o", "film.avi"), "video 'film.avi' must end in .mp4 or .gif"),
         (("bench", "everything"), "unknown benchmark 'everything'; there are: accuracy"),
     ],
 )

@@ -95,6 +95,7 @@ def test_a_model_with_muscles_does_not_run_without_callbacks(pair):
         ({"torque": {"knee": 1.0}}, "unknown hinge or slide joint 'knee'; there are: elbow"),
         ({"excitation": {"elbow_flexor": float("nan")}}, "level must be finite, got nan"),
         ({"duration": 0.0}, "duration must be positive, got 0.0 s"),
+        ({"duration": 1e-9}, "duration must be at least a timestep, 0.001 s, got 1e-09 s"),
         ({"every": 0}, "every must be at least 1 step, got 0"),
     ],
 )
