@@ -14,7 +14,9 @@ from mjhill.layout import SLOTS
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-ELBOW = (ROOT / "models" / "elbow" / "README.md").read_text(encoding="utf-8")
+MODELS = [
+    path.read_text(encoding="utf-8") for path in sorted((ROOT / "models").glob("*/README.md"))
+]
 
 
 def blocks(text, language):
@@ -29,7 +31,9 @@ COMMANDS = [
 ]
 
 
-@pytest.mark.parametrize("snippet", blocks(README, "python") + blocks(ELBOW, "python"))
+@pytest.mark.parametrize(
+    "snippet", [block for text in (README, *MODELS) for block in blocks(text, "python")]
+)
 def test_every_python_snippet_runs(snippet):
     run = subprocess.run(
         [sys.executable, "-c", snippet], check=False, capture_output=True, text=True
