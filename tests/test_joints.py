@@ -29,26 +29,25 @@ def tasks(joint):
 
 
 @pytest.mark.parametrize("name", list(mjhill.JOINTS))
-def test_a_joint_is_accurate_at_its_default_timestep(name):
+def test_a_joint_is_accurate_at_its_default_timestep_and_holds_at_five_times_it(name):
     joint, model = mjhill.JOINTS[name], mjhill.load(name)
-    timestep = model.opt.timestep
+    default = model.opt.timestep
     for excitation in tasks(joint):
         truth = simulate(joint, excitation, duration=0.4, sample=FINE)[f"{name}.angle"]
-        found = angles(model, joint, excitation, timestep, 0.4)
-        error = np.abs(found - truth[:: round(timestep / FINE)]).max()
-        assert error <= 0.005 * np.ptp(truth)
+        for timestep, allowed in ((default, 0.005), (5 * default, 0.05)):
+            found = angles(model, joint, excitation, timestep, 0.4)
+            error = np.abs(found - truth[:: round(timestep / FINE)]).max()
+            assert error <= allowed * np.ptp(truth)
 
 
 @pytest.mark.parametrize("name", list(mjhill.JOINTS))
-def test_a_joint_stays_bounded_at_five_times_its_default_timestep(name):
+def test_full_co_contraction_does_not_ring_at_five_times_the_default_timestep(name):
     joint, model = mjhill.JOINTS[name], mjhill.load(name)
-    timestep = 5 * model.opt.timestep
-    low, high = joint.range
-    for excitation in [*tasks(joint), dict.fromkeys(joint.muscles, 1.0)]:
-        found = angles(model, joint, excitation, timestep, 1.0)
-        assert low - 0.6 < found.min()
-        assert found.max() < high + 0.6
-        assert np.abs(np.diff(found[-20:])).max() < 0.02  # it settles, it does not ring
+    excitation = dict.fromkeys(joint.muscles, 1.0)
+    found = angles(model, joint, excitation, 5 * model.opt.timestep, 1.0)
+    steps = np.diff(found[-40:])
+    assert np.abs(steps).max() < 5e-3
+    assert np.abs(np.diff(steps)).max() < 1e-3
 
 
 @pytest.mark.parametrize("name", list(mjhill.JOINTS))
