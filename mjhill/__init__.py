@@ -4,6 +4,8 @@ from mjhill import reference as reference
 from mjhill.checks import check_model as check_model
 from mjhill.equilibrium import at_home as at_home
 from mjhill.equilibrium import equilibrate as equilibrate
+from mjhill.equivalent import anatomical_muscle as anatomical_muscle
+from mjhill.equivalent import equivalent_muscle as equivalent_muscle
 from mjhill.install import install as install
 from mjhill.install import installed as installed
 from mjhill.install import installed_backend as installed_backend
