@@ -92,12 +92,13 @@ def list_(as_json: bool) -> None:
 @_json_option
 def info(model: str, mjcf: bool, as_json: bool) -> None:
     """Show the parameters of MODEL, a joint's name or a path, with units and sources."""
-    from mjhill import describe
+    from mjhill.describe import rows
+    from mjhill.mjcf import snippet
 
     if mjcf:
-        click.echo(describe.mjcf(model))
+        click.echo(snippet(model))
         return
-    _table(describe.rows(model), as_json, title=model)
+    _table(rows(model), as_json, title=model)
 
 
 @main.command()

@@ -1,4 +1,4 @@
-"""A model's parameters as rows of a table, and as MJCF."""
+"""A model's parameters as rows of a table."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ import mujoco
 from mjhill.layout import (
     has_passive,
     muscle_names,
-    parameter_rows,
-    passive_row,
     read_muscle,
     read_passive,
     turns,
@@ -37,42 +35,21 @@ def rows(model: str | Path) -> list[dict[str, Any]]:
         parts += [(name, muscle, True) for name, muscle in joint.muscles.items()]
     else:
         loaded = load(model)
-        parts = [(name, read_passive(loaded, name), hinge) for name, hinge in _elastic(loaded)]
+        parts = [
+            (name, read_passive(loaded, name), hinge) for name, hinge in elastic_joints(loaded)
+        ]
         for name in muscle_names(loaded):
             hinge = turns(loaded, loaded.actuator(name).id)
             parts.append((name, read_muscle(loaded, name), hinge))
     return [row for part in parts for row in _part_rows(*part)]
 
 
-def _elastic(model: mujoco.MjModel) -> Iterator[tuple[str, bool]]:
+def elastic_joints(model: mujoco.MjModel) -> Iterator[tuple[str, bool]]:
     """Joints with passive elasticity, and whether each is a hinge."""
     for joint in range(model.njnt):
         if has_passive(model, joint):
             hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
             yield model.joint(joint).name, bool(hinge)
-
-
-def mjcf(model: str | Path) -> str:
-    """The attributes of MJCF that hold the parameters, for pasting into a model.
-
-    Raises:
-        ValueError: As ``load``.
-    """
-    loaded = load(model)
-    lines = []
-    for name, _ in _elastic(loaded):
-        lines.append(
-            f'<joint name="{name}" user="{_text(passive_row(read_passive(loaded, name)))}"/>'
-        )
-    for name in muscle_names(loaded):
-        rows = parameter_rows(read_muscle(loaded, name))
-        lines += [
-            f'<general name="{name}" gear="{loaded.actuator(name).gear[0]:g}" dyntype="user"',
-            '  actdim="3" gaintype="fixed" biastype="user" ctrlrange="0 1" lengthrange="-1 1"',
-            *(f'  {array}="{_text(row)}"' for array, row in rows.items()),
-        ]
-        lines[-1] += "/>"
-    return "\n".join(lines)
 
 
 def _part_rows(name: str, part: Any, hinge: bool) -> Iterator[dict[str, Any]]:
@@ -88,8 +65,3 @@ def _part_rows(name: str, part: Any, hinge: bool) -> Iterator[dict[str, Any]]:
             "meaning": quantity.meaning,
             "source": source,
         }
-
-
-def _text(row: Any) -> str:
-    """Shortest exact decimals."""
-    return " ".join(repr(value).removesuffix(".0") for value in row.tolist())

@@ -1,4 +1,4 @@
-"""The parameters of a joint as MJCF: what ``models/<joint>/parameters.xml`` holds.
+"""Parameters as MJCF: ``models/<joint>/parameters.xml``, and snippets for other models.
 
 ``python -m mjhill.mjcf FOLDER`` writes the file of every joint that has a folder there.
 """
@@ -10,8 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
+from mjhill.describe import elastic_joints
 from mjhill.files import replacing
-from mjhill.layout import NUSER_JNT, STATES, parameter_rows, passive_row
+from mjhill.layout import (
+    NUSER_JNT,
+    STATES,
+    muscle_names,
+    parameter_rows,
+    passive_row,
+    read_muscle,
+    read_passive,
+)
+from mjhill.models import load
 from mjhill.parameters import JOINTS, Joint
 from mjhill.readings import steady_stretch
 
@@ -81,6 +91,29 @@ def parameters_xml(joint: Joint) -> str:
         length = gear * joint.home_angle
         act += [0.0, 0.0, length - steady_stretch(muscle, 0.0, length)]
     return head + muscles + _TAIL.format(home=_text([joint.home_angle]), act=_text(act))
+
+
+def snippet(model: str | Path) -> str:
+    """The elements of a joint's model or a file that hold parameters, for pasting into another.
+
+    Raises:
+        ValueError: As ``load``.
+    """
+    loaded = load(model)
+    lines = []
+    for name, _ in elastic_joints(loaded):
+        row = passive_row(read_passive(loaded, name))
+        lines.append(f'<joint name="{name}" user="{_text(row)}"/>')
+    for name in muscle_names(loaded):
+        rows = parameter_rows(read_muscle(loaded, name))
+        lines += [
+            f'<general name="{name}" gear="{loaded.actuator(name).gear[0]:g}" dyntype="user"',
+            f'  actdim="{STATES}" gaintype="fixed" biastype="user" ctrlrange="0 1"',
+            '  lengthrange="-1 1"',
+            *(f'  {array}="{_text(row)}"' for array, row in rows.items()),
+        ]
+        lines[-1] += "/>"
+    return "\n".join(lines)
 
 
 def write_parameters(folder: Path) -> list[Path]:
