@@ -10,16 +10,18 @@ import numpy as np
 
 from mjhill.layout import (
     MUSCLE_TAG,
+    SCALAR_JOINTS,
     STATES,
+    actuator_names,
     addresses,
     has_passive,
+    joint_names,
+    moments,
     muscle_names,
     read_muscle,
     read_passive,
 )
 from mjhill.parameters import Muscle
-
-_SCALAR_JOINTS = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
 
 
 def check_model(model: mujoco.MjModel) -> None:
@@ -36,10 +38,9 @@ def check_model(model: mujoco.MjModel) -> None:
         if model.actuator_dynprm[actuator, 0] == MUSCLE_TAG:
             _check_marks(model, actuator)
     muscles = {name: read_muscle(model, name) for name in muscle_names(model)}
-    for joint in range(model.njnt):
+    for joint, name in enumerate(joint_names(model)):
         if has_passive(model, joint):
-            name = model.joint(joint).name
-            if model.jnt_type[joint] not in _SCALAR_JOINTS:
+            if model.jnt_type[joint] not in SCALAR_JOINTS:
                 raise ValueError(f"joint {name!r}: passive elasticity needs a hinge or slide joint")
             read_passive(model, name)
     _check_timestep(model, muscles)
@@ -66,7 +67,7 @@ def _check_marks(model: mujoco.MjModel, actuator: int) -> None:
     ]
     for what, found, needed in wanted:
         if found != needed:
-            name = model.actuator(actuator).name
+            name = actuator_names(model)[actuator]
             raise ValueError(
                 f"actuator {name!r} is half a mjhill muscle: it has the tag "
                 f"dynprm[0] = {MUSCLE_TAG:.0f} but {what} is {_word(found)}, not "
@@ -102,14 +103,11 @@ def stable_timesteps(model: mujoco.MjModel, muscles: dict[str, Muscle]) -> dict[
     """
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
-    moments = np.zeros((model.nout, model.nv))
-    mujoco.mju_sparse2dense(
-        moments, data.actuator_moment, data.moment_rownnz, data.moment_rowadr, data.moment_colind
-    )
+    arms = moments(model, data)
     limits = {}
     for name, address in addresses(model):
         muscle = muscles[name]
-        moment = moments[address.out : address.out + 1]
+        moment = arms[address.out : address.out + 1]
         acceleration = np.zeros_like(moment)
         mujoco.mj_solveM(model, data, acceleration, moment)
         inverse_inertia = float((moment @ acceleration.T)[0, 0])

@@ -9,8 +9,9 @@ from typing import Any
 import mujoco
 
 from mjhill.layout import (
+    addresses,
     has_passive,
-    muscle_names,
+    joint_names,
     read_muscle,
     read_passive,
     turns,
@@ -38,18 +39,17 @@ def rows(model: str | Path) -> list[dict[str, Any]]:
         parts = [
             (name, read_passive(loaded, name), hinge) for name, hinge in elastic_joints(loaded)
         ]
-        for name in muscle_names(loaded):
-            hinge = turns(loaded, loaded.actuator(name).id)
+        for name, at in addresses(loaded):
+            hinge = turns(loaded, at.actuator)
             parts.append((name, read_muscle(loaded, name), hinge))
     return [row for part in parts for row in _part_rows(*part)]
 
 
 def elastic_joints(model: mujoco.MjModel) -> Iterator[tuple[str, bool]]:
     """Joints with passive elasticity, and whether each is a hinge."""
-    for joint in range(model.njnt):
+    for joint, name in enumerate(joint_names(model)):
         if has_passive(model, joint):
-            hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
-            yield model.joint(joint).name, bool(hinge)
+            yield name, bool(model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE)
 
 
 def _part_rows(name: str, part: Any, hinge: bool) -> Iterator[dict[str, Any]]:

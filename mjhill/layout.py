@@ -20,6 +20,8 @@ from mjhill.parameters import Muscle, Passive
 MUSCLE_TAG = 198701.0  # dynprm[0] of a muscle with three states, slots as below
 PASSIVE_TAG = 198702.0  # jnt_user[0] of a joint with exponential passive elasticity
 STATES = 3  # n, a, s
+# joints with one coordinate, which can have passive elasticity
+SCALAR_JOINTS = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
 
 # parameter -> array and index; gainprm[0] is the gain of the fixed gain type and must be 0
 SLOTS: dict[str, tuple[str, int]] = {
@@ -100,9 +102,19 @@ def turns(model: mujoco.MjModel, actuator: int) -> bool:
     return bool(on_joint and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE)
 
 
+def actuator_names(model: mujoco.MjModel) -> list[str]:
+    """Name of each actuator; one without a name is called ``actuator<id>``."""
+    return [model.actuator(i).name or f"actuator{i}" for i in range(model.nactuator)]
+
+
+def joint_names(model: mujoco.MjModel) -> list[str]:
+    """Name of each joint; one without a name is called ``joint<id>``."""
+    return [model.joint(i).name or f"joint{i}" for i in range(model.njnt)]
+
+
 def muscle_names(model: mujoco.MjModel) -> list[str]:
     """Names of the muscles of a model, in the order of its actuators."""
-    return [model.actuator(i).name for i in range(model.nactuator) if is_muscle(model, i)]
+    return [name for i, name in enumerate(actuator_names(model)) if is_muscle(model, i)]
 
 
 def address(model: mujoco.MjModel, name: str) -> Address:
@@ -111,10 +123,20 @@ def address(model: mujoco.MjModel, name: str) -> Address:
     Raises:
         ValueError: No muscle has this name; the message lists those there are.
     """
-    actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
-    if actuator < 0 or not is_muscle(model, actuator):
+    if name not in muscle_names(model):
         known = ", ".join(muscle_names(model)) or "none"
         raise ValueError(f"unknown muscle {name!r}; the model's muscles are: {known}")
+    return _address(model, actuator_names(model).index(name))
+
+
+def addresses(model: mujoco.MjModel) -> Iterator[tuple[str, Address]]:
+    """Name and addresses of each muscle of a model."""
+    for actuator, name in enumerate(actuator_names(model)):
+        if is_muscle(model, actuator):
+            yield name, _address(model, actuator)
+
+
+def _address(model: mujoco.MjModel, actuator: int) -> Address:
     return Address(
         actuator,
         int(model.actuator_ctrladr[actuator]),
@@ -123,10 +145,13 @@ def address(model: mujoco.MjModel, name: str) -> Address:
     )
 
 
-def addresses(model: mujoco.MjModel) -> Iterator[tuple[str, Address]]:
-    """Name and addresses of each muscle of a model."""
-    for name in muscle_names(model):
-        yield name, address(model, name)
+def moments(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """Moment arms of all outputs, shape (nout, nv); needs ``mj_fwdPosition``."""
+    dense = np.zeros((model.nout, model.nv))
+    mujoco.mju_sparse2dense(
+        dense, data.actuator_moment, data.moment_rownnz, data.moment_rowadr, data.moment_colind
+    )
+    return dense
 
 
 def read_muscle(model: mujoco.MjModel, name: str) -> Muscle:
@@ -212,11 +237,12 @@ def joint_id(model: mujoco.MjModel, name: str) -> int:
     Raises:
         ValueError: No joint has this name; the message lists those there are.
     """
-    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
-    if joint < 0:
-        known = ", ".join(model.joint(i).name for i in range(model.njnt)) or "none"
-        raise ValueError(f"unknown joint {name!r}; the model's joints are: {known}")
-    return int(joint)
+    names = joint_names(model)
+    if name not in names:
+        raise ValueError(
+            f"unknown joint {name!r}; the model's joints are: {', '.join(names) or 'none'}"
+        )
+    return names.index(name)
 
 
 _ARRAYS = ("dynprm", "gainprm", "biasprm")

@@ -15,7 +15,7 @@ from mjhill.files import replacing
 from mjhill.layout import (
     NUSER_JNT,
     STATES,
-    muscle_names,
+    addresses,
     parameter_rows,
     passive_row,
     read_muscle,
@@ -104,10 +104,10 @@ def snippet(model: str | Path) -> str:
     for name, _ in elastic_joints(loaded):
         row = passive_row(read_passive(loaded, name))
         lines.append(f'<joint name="{name}" user="{_text(row)}"/>')
-    for name in muscle_names(loaded):
+    for name, at in addresses(loaded):
         rows = parameter_rows(read_muscle(loaded, name))
         lines += [
-            f'<general name="{name}" gear="{loaded.actuator(name).gear[0]:g}" dyntype="user"',
+            f'<general name="{name}" gear="{loaded.actuator_gear[at.out, 0]:g}" dyntype="user"',
             f'  actdim="{STATES}" gaintype="fixed" biastype="user" ctrlrange="0 1"',
             '  lengthrange="-1 1"',
             *(f'  {array}="{_text(row)}"' for array, row in rows.items()),

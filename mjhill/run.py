@@ -12,7 +12,16 @@ from mjhill.callbacks.python import control, muscle_length, series_stretch
 from mjhill.checks import check_model
 from mjhill.equilibrium import check_finite
 from mjhill.install import installed_backend
-from mjhill.layout import address, is_muscle, joint_id, read_muscle, turns
+from mjhill.layout import (
+    SCALAR_JOINTS,
+    actuator_names,
+    address,
+    is_muscle,
+    joint_id,
+    joint_names,
+    read_muscle,
+    turns,
+)
 from mjhill.readings import shortening_velocity, tension
 from mjhill.recording import Recording
 from mjhill.signals import Signal, as_signals
@@ -69,8 +78,7 @@ def record(
         raise ValueError(f"every must be at least 1 step, got {every}")
     _require_callbacks(model)
     check_finite(data)
-    actuators = [model.actuator(i).name for i in range(model.nactuator)]
-    inputs = as_signals(excitation or {}, actuators, "actuator")
+    inputs = as_signals(excitation or {}, actuator_names(model), "actuator")
     loads = as_signals(torque or {}, _scalar_joints(model), "hinge or slide joint")
     apply = _inputs(model, inputs, loads)
     readers = _readers(model, list(loads))
@@ -78,7 +86,7 @@ def record(
     for step in range(steps + 1):
         apply(data, data.time + 0.5 * timestep)
         if step % every == 0:
-            _refresh(model, data)
+            mujoco.mj_forward(model, data)  # lengths and rates of this very state
             table[step // every] = [data.time, *(read(data) for _, _, read in readers)]
         if step < steps:
             mujoco.mj_step(model, data)
@@ -104,9 +112,9 @@ def _inputs(
     model: mujoco.MjModel, inputs: Mapping[str, Signal], loads: Mapping[str, Signal]
 ) -> Callable[[mujoco.MjData, float], None]:
     """A function that writes the inputs of a time into data."""
+    actuators = actuator_names(model)
     controls = [
-        (int(model.actuator_ctrladr[model.actuator(name).id]), name, s)
-        for name, s in inputs.items()
+        (int(model.actuator_ctrladr[actuators.index(name)]), name, s) for name, s in inputs.items()
     ]
     dofs = [(int(model.jnt_dofadr[joint_id(model, name)]), name, s) for name, s in loads.items()]
 
@@ -122,7 +130,7 @@ def _inputs(
 
 
 def _scalar_joints(model: mujoco.MjModel) -> list[str]:
-    return [model.joint(i).name for i in range(model.njnt) if int(model.jnt_type[i]) in _EFFORT]
+    return [name for i, name in enumerate(joint_names(model)) if model.jnt_type[i] in SCALAR_JOINTS]
 
 
 def _readers(model: mujoco.MjModel, loads: list[str]) -> list[tuple[str, str, _Reader]]:
@@ -148,7 +156,7 @@ def _item(array: str, index: int, sign: float = 1.0) -> _Reader:
 
 
 def _joint_readers(model: mujoco.MjModel, joint: int) -> list[tuple[str, str, _Reader]]:
-    name = model.joint(joint).name or f"joint{joint}"
+    name = joint_names(model)[joint]
     position, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
     kind = int(model.jnt_type[joint])
     if kind in _COORDINATES:
@@ -167,7 +175,7 @@ def _joint_readers(model: mujoco.MjModel, joint: int) -> list[tuple[str, str, _R
 
 
 def _muscle_readers(model: mujoco.MjModel, actuator: int) -> list[tuple[str, str, _Reader]]:
-    name = model.actuator(actuator).name
+    name = actuator_names(model)[actuator]
     muscle, at = read_muscle(model, name), address(model, name)
     effort, length_unit = _muscle_units(model, actuator)
 
@@ -189,7 +197,7 @@ def _muscle_readers(model: mujoco.MjModel, actuator: int) -> list[tuple[str, str
 
 
 def _native_readers(model: mujoco.MjModel, actuator: int) -> list[tuple[str, str, _Reader]]:
-    name = model.actuator(actuator).name
+    name = actuator_names(model)[actuator]
     effort, _ = _muscle_units(model, actuator)
     return [
         (f"{name}.u", "-", _item("ctrl", int(model.actuator_ctrladr[actuator]))),
@@ -206,17 +214,14 @@ def _muscle_units(model: mujoco.MjModel, actuator: int) -> tuple[str, str]:
     return ("N·m", "rad") if turns(model, actuator) else ("N", "m")
 
 
-def _refresh(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Lengths and forces of the state about to be stepped from."""
-    mujoco.mj_forward(model, data)
-
-
 def check_warnings(data: mujoco.MjData) -> None:
     """Refuse data in which MuJoCo warned: it resets a state that went bad and goes on.
 
     Raises:
         RuntimeError: A warning was counted; the message has its name and the time.
     """
+    if not data.warning.number.any():
+        return
     for index, warning in enumerate(data.warning):
         if warning.number:
             name = mujoco.mjtWarning(index).name.removeprefix("mjWARN_").lower()

@@ -5,7 +5,9 @@ import pytest
 from conftest import PLAIN_XML
 
 import mjhill
+from mjhill.comparison.native import native_spec
 from mjhill.layout import RATE_PARAMETERS, SLOTS
+from mjhill.spec import joint_spec
 
 
 def test_a_muscle_is_read_back_as_it_was_added(pair, elbow):
@@ -76,3 +78,31 @@ def test_passive_elasticity_needs_a_scalar_joint(elbow):
     spec = mujoco.MjSpec.from_string(PLAIN_XML.replace('name="elbow"', 'name="elbow" type="ball"'))
     with pytest.raises(ValueError, match="needs a hinge or slide joint"):
         mjhill.add_passive(spec, joint="elbow", passive=elbow.passive)
+
+
+def test_muscles_without_names_are_numbered(elbow):
+    spec = joint_spec(elbow)
+    for actuator in spec.actuators:
+        actuator.name = ""
+    model = spec.compile()
+    mjhill.check_model(model)
+    assert mjhill.muscle_names(model) == ["actuator0", "actuator1"]
+    assert mjhill.read_muscle(model, "actuator0") == elbow.muscles["elbow_flexor"]
+    with mjhill.installed():
+        run = mjhill.record(
+            model, mjhill.at_home(model), duration=0.2, excitation={"actuator0": 0.5}
+        )
+    assert run["actuator0.force"][-1] > 1.0
+    assert native_spec(spec).compile().na == 2
+
+
+def test_a_passive_joint_without_a_name_is_numbered(elbow):
+    spec = mujoco.MjSpec.from_string(PLAIN_XML)
+    mjhill.add_passive(spec, joint="elbow", passive=elbow.passive)
+    spec.joints[0].name = ""
+    model = spec.compile()
+    mjhill.check_model(model)
+    assert mjhill.read_passive(model, "joint0") == elbow.passive
+    with mjhill.installed():
+        run = mjhill.record(model, mujoco.MjData(model), duration=0.05)
+    assert "joint0.angle" in run.series

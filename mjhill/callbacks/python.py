@@ -6,10 +6,8 @@ import mujoco
 import numpy as np
 
 from mjhill.elements import passive_torque, series_force
-from mjhill.layout import NUSER_JNT, RATE_PARAMETERS, SLOTS, has_passive, is_muscle
+from mjhill.layout import NUSER_JNT, RATE_PARAMETERS, SCALAR_JOINTS, SLOTS, has_passive, is_muscle
 from mjhill.scheme import muscle_rates, present_length
-
-_SCALAR_JOINTS = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
 
 
 def act_dyn(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float | None:
@@ -71,7 +69,7 @@ def passive(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     if model.nuser_jnt < NUSER_JNT:
         return
     for joint in range(model.njnt):
-        if not has_passive(model, joint) or model.jnt_type[joint] not in _SCALAR_JOINTS:
+        if not has_passive(model, joint) or model.jnt_type[joint] not in SCALAR_JOINTS:
             continue
         dof = model.jnt_dofadr[joint]
         if not data.tree_awake[model.dof_treeid[dof]]:

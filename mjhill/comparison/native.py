@@ -11,13 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from mjhill.install import without_python_callbacks
-from mjhill.layout import addresses, is_muscle, read_muscle
+from mjhill.layout import actuator_names, addresses, is_muscle, read_muscle
 from mjhill.models import load, model_path
 from mjhill.parameters import JOINTS, Muscle
 
@@ -80,15 +81,13 @@ def muscle_delay(muscle: Muscle, *, rising: bool) -> float:
     tau = muscle.activation_tau if rising else muscle.deactivation_tau
     if muscle.electrical_stimulation:
         return tau
+    from scipy.optimize import brentq
+
     first, second = sorted((muscle.excitation_tau, tau))
-    low, high = second, 2 * (first + second)  # 1.073 of the sum where both are equal, else less
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if _two_lags_left(middle, first, second) > math.exp(-1):
-            low = middle
-        else:
-            high = middle
-    return high
+    # it takes as long as the longer lag, and 1.073 of the sum where both are equal
+    span = second, 2 * (first + second)
+    left = partial(_two_lags_left, first=first, second=second)
+    return float(brentq(lambda time: left(time) - math.exp(-1), *span, xtol=1e-15))
 
 
 def _two_lags_left(time: float, first: float, second: float) -> float:
@@ -179,9 +178,9 @@ def converted(
     }
     if not muscles:
         raise ValueError("the model has no mjhill muscle; add one with mjhill.add_muscle")
-    for actuator in result.actuators:
-        if actuator.name in muscles:
-            convert(actuator, *muscles[actuator.name])
+    for name, actuator in zip(actuator_names(model), result.actuators, strict=True):
+        if name in muscles:
+            convert(actuator, *muscles[name])
     kept = _kept_states(model, states)
     for key in result.keys:
         if len(key.act) > 0:  # without them the compiler fills in its own

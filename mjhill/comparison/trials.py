@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mjhill.comparison import responses
 from mjhill.equilibrium import at_home, equilibrate
-from mjhill.layout import addresses, read_muscle
+from mjhill.layout import addresses, joint_names, moments, read_muscle
 from mjhill.recording import Recording
 from mjhill.run import record
 from mjhill.signals import Signal, pulse
@@ -68,12 +68,9 @@ def find_pair(model: mujoco.MjModel) -> Pair:
         )
     data = at_home(model)
     mujoco.mj_fwdPosition(model, data)
-    moments = np.zeros((model.nout, model.nv))
-    mujoco.mju_sparse2dense(
-        moments, data.actuator_moment, data.moment_rownnz, data.moment_rowadr, data.moment_colind
-    )
+    arms = moments(model, data)
     # force is negative when a muscle pulls, so it moves the joint against its moment
-    pulls = {name: -float(moments[at.out, 0]) for name, at in addresses(model)}
+    pulls = {name: -float(arms[at.out, 0]) for name, at in addresses(model)}
     agonist = next((name for name, pull in pulls.items() if pull > 0), None)
     antagonist = next((name for name, pull in pulls.items() if pull < 0), None)
     if agonist is None or antagonist is None:
@@ -81,7 +78,7 @@ def find_pair(model: mujoco.MjModel) -> Pair:
             "a comparison needs a muscle for each direction of the joint, these pull the same "
             f"way: {', '.join(pulls) or 'none'}"
         )
-    joint, coordinate = model.joint(0).name, kinds[int(model.jnt_type[0])]
+    joint, coordinate = joint_names(model)[0], kinds[int(model.jnt_type[0])]
     force = read_muscle(model, agonist).max_isometric_force
     return Pair(joint, coordinate, agonist, antagonist, force, force * pulls[agonist])
 

@@ -80,12 +80,11 @@ def drawn_muscles(model: mujoco.MjModel, recording: Recording | None) -> tuple[D
     A muscle is drawn along the tendon of its name, or else along the tendon it acts on.
     """
     found: list[DrawnMuscle] = []
-    for i in range(model.nactuator):
-        name = model.actuator(i).name
+    for i, name in enumerate(layout.actuator_names(model)):
         force = _max_force(model, i)
         wanted = {f"{name}.a", f"{name}.force"}
         recorded = recording is None or wanted <= set(recording)
-        if force is None or not name or not recorded:
+        if force is None or not recorded:
             continue
         colour = MUSCLE_COLOURS[len(found) % len(MUSCLE_COLOURS)]
         found.append(DrawnMuscle(name, force, _tendon(model, i), colour))
@@ -135,7 +134,7 @@ def _max_force(model: mujoco.MjModel, actuator: int) -> float | None:
 
 
 def _tendon(model: mujoco.MjModel, actuator: int) -> int:
-    name = model.actuator(actuator).name
+    name = layout.actuator_names(model)[actuator]
     tendon = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, name))
     if tendon < 0 and model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_TENDON:
         tendon = int(model.actuator_trnid[actuator, 0])

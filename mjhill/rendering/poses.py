@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjhill.layout import joint_names
 from mjhill.recording import Recording
 
 # what a recording calls the coordinates of a joint, by its type
@@ -44,8 +45,7 @@ class Poses:
         """
         scalars: list[tuple[int, NDArray[np.float64]]] = []
         others: list[tuple[int, NDArray[np.float64]]] = []
-        for i in range(model.njnt):
-            name = model.joint(i).name or f"joint{i}"  # as ``record`` calls it
+        for i, name in enumerate(joint_names(model)):
             coordinates = _COORDINATES[int(model.jnt_type[i])]
             kept = scalars if len(coordinates) == 1 else others
             for k, coordinate in enumerate(coordinates):
