@@ -10,6 +10,7 @@ from mjhill.install import install as install
 from mjhill.install import installed as installed
 from mjhill.install import installed_backend as installed_backend
 from mjhill.install import uninstall as uninstall
+from mjhill.joints import JOINTS as JOINTS
 from mjhill.layout import muscle_names as muscle_names
 from mjhill.layout import read_muscle as read_muscle
 from mjhill.layout import read_passive as read_passive
@@ -17,7 +18,6 @@ from mjhill.layout import write_muscle as write_muscle
 from mjhill.layout import write_passive as write_passive
 from mjhill.models import load as load
 from mjhill.models import model_path as model_path
-from mjhill.parameters import JOINTS as JOINTS
 from mjhill.parameters import Joint as Joint
 from mjhill.parameters import Muscle as Muscle
 from mjhill.parameters import Passive as Passive

@@ -72,7 +72,7 @@ def demo(output: Path, as_json: bool) -> None:
 @_json_option
 def list_(as_json: bool) -> None:
     """List the joints that come with mjhill."""
-    from mjhill.parameters import JOINTS
+    from mjhill.joints import JOINTS
 
     rows = [
         {

@@ -8,6 +8,7 @@ from typing import Any
 
 import mujoco
 
+from mjhill.joints import JOINTS
 from mjhill.layout import (
     addresses,
     has_passive,
@@ -17,7 +18,7 @@ from mjhill.layout import (
     turns,
 )
 from mjhill.models import load
-from mjhill.parameters import JOINTS, quantities
+from mjhill.parameters import quantities
 
 
 def rows(model: str | Path) -> list[dict[str, Any]]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from mjhill.describe import elastic_joints
 from mjhill.files import replacing
+from mjhill.joints import JOINTS
 from mjhill.layout import (
     NUSER_JNT,
     STATES,
@@ -22,7 +23,7 @@ from mjhill.layout import (
     read_passive,
 )
 from mjhill.models import load
-from mjhill.parameters import JOINTS, Joint
+from mjhill.parameters import Joint
 from mjhill.readings import steady_stretch
 
 _HEAD = """<mujocoinclude>

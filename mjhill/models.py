@@ -8,7 +8,7 @@ import mujoco
 
 from mjhill.checks import check_model
 from mjhill.install import without_python_callbacks
-from mjhill.parameters import JOINTS
+from mjhill.joints import JOINTS
 
 _HERE = Path(__file__).parent
 

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields
-from functools import cache
 from numbers import Real
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-_DATA = Path(__file__).parent / "data" / "joints.toml"
 # units of a muscle on a hinge, and of one on a slide or tendon
 _FORCE, _LENGTH, _VELOCITY = ("N·m", "N"), ("rad", "m"), ("rad/s", "m/s")
 
@@ -201,6 +197,8 @@ class Joint:
         home_angle: Angle of the ``home`` pose [rad].
         muscles: Muscles by name, the one that pulls towards positive angles first.
         gears: Actuator gear of each muscle: length = gear * angle.
+        postures: Angle [rad] from which a step of each muscle starts, at rest; the paper's Table 2
+            does not state it.
         sources: Where each value comes from, by parameter name.
     """
 
@@ -219,6 +217,7 @@ class Joint:
     home_angle: float
     muscles: Mapping[str, Muscle]
     gears: Mapping[str, float]
+    postures: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     sources: Mapping[str, str] = _sources()
 
     def __post_init__(self) -> None:
@@ -228,60 +227,9 @@ class Joint:
             ValueError: A parameter is not a finite number inside its bounds.
         """
         _check_quantities(self)
-        if set(self.muscles) != set(self.gears):
-            raise ValueError(
-                f"gears must name the muscles {sorted(self.muscles)}, got {sorted(self.gears)}"
-            )
-
-
-class _Joints(Mapping[str, Joint]):
-    """The joints of ``data/joints.toml``, read on first use."""
-
-    def __getitem__(self, name: str) -> Joint:
-        if name not in _table():
-            raise KeyError(f"unknown joint {name!r}; there are: {', '.join(_table())}")
-        return _joint(name)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(_table())
-
-    def __len__(self) -> int:
-        return len(_table())
-
-
-JOINTS: Mapping[str, Joint] = _Joints()
-
-
-@cache
-def _table() -> dict[str, Any]:
-    return tomllib.loads(_DATA.read_text(encoding="utf-8"))
-
-
-@cache
-def _joint(name: str) -> Joint:
-    table = dict(_table()[name])
-    passive = Passive(**_split(table.pop("passive")))
-    muscles, gears = {}, {}
-    for muscle_name, muscle_table in table.pop("muscles").items():
-        values = _split(muscle_table)
-        gears[muscle_name] = values.pop("gear")
-        muscles[muscle_name] = Muscle(**values)
-    values = _split(table)
-    values["range"] = tuple(values["range"])
-    return Joint(
-        name=name,
-        passive=passive,
-        muscles=MappingProxyType(muscles),
-        gears=MappingProxyType(gears),
-        **values,
-    )
-
-
-def _split(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Constructor arguments from entries ``name = {value = ..., source = ...}``."""
-    values, sources = {}, {}
-    for name, entry in table.items():
-        values[name] = entry["value"] if isinstance(entry, dict) else entry
-        if isinstance(entry, dict):
-            sources[name] = entry["source"]
-    return {**values, "sources": MappingProxyType(sources)}
+        for what in ("gears", "postures"):
+            names = set(getattr(self, what))
+            if names != set(self.muscles) and (names or what == "gears"):
+                raise ValueError(
+                    f"{what} must name the muscles {sorted(self.muscles)}, got {sorted(names)}"
+                )

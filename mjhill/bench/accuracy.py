@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from mjhill.bench.result import Result
 from mjhill.equilibrium import at_home
 from mjhill.install import installed
+from mjhill.joints import JOINTS
 from mjhill.models import load
-from mjhill.parameters import JOINTS
 from mjhill.reference import simulate
 
 LEVELS = (0.1, 0.5, 1.0)

@@ -8,7 +8,7 @@ from typing import Any
 
 from mjhill.bench.result import Result
 from mjhill.comparison import step_cost
-from mjhill.parameters import JOINTS
+from mjhill.joints import JOINTS
 from mjhill.spec import joint_spec
 
 ROUNDS, STEPS = 1500, 150

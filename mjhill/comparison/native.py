@@ -18,9 +18,10 @@ import mujoco
 import numpy as np
 
 from mjhill.install import without_python_callbacks
+from mjhill.joints import JOINTS
 from mjhill.layout import actuator_names, addresses, is_muscle, read_muscle
 from mjhill.models import load, model_path
-from mjhill.parameters import JOINTS, Muscle
+from mjhill.parameters import Muscle
 
 _LMIN = 0.5  # MuJoCo's default; it fixes the unit of length, not the curve
 _UNUSED = 1.0  # scale and fpmax: without effect here, but the compiler wants them positive

@@ -1,0 +1,126 @@
+"""The free parameters of a joint, and joints made from values of them.
+
+An entry of the parameter file that has ``bounds`` is free. The bounds say what physiology allows:
+they are hard, and the prior is a normal distribution about their middle whose two standard
+deviations reach them, on a logarithmic scale where both bounds are positive.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import exp, log
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjhill.joints import parameter_file
+from mjhill.parameters import Joint
+
+DEVIATIONS = 2.0  # from the middle of the bounds to either
+
+
+@dataclass(frozen=True)
+class Free:
+    """One free parameter.
+
+    Attributes:
+        path: Keys of its entry in a joint's table, such as
+            ``("muscles", "elbow_flexor", "max_velocity")``.
+        low: Lower bound, in the parameter's unit.
+        high: Upper bound.
+    """
+
+    path: tuple[str, ...]
+    low: float
+    high: float
+
+    @property
+    def name(self) -> str:
+        """Its name in tables: ``elbow_flexor.max_velocity``, ``passive.k1_pos``, ``damping``."""
+        return ".".join(self.path[1:] if self.path[0] == "muscles" else self.path)
+
+    def value(self, deviation: float) -> float:
+        """The value [the parameter's unit] some standard deviations from the middle."""
+        share = 0.5 + 0.5 * deviation / DEVIATIONS
+        if self.low > 0:
+            value = exp((1 - share) * log(self.low) + share * log(self.high))
+        else:
+            value = (1 - share) * self.low + share * self.high
+        return min(max(value, self.low), self.high)
+
+    def deviation(self, value: float) -> float:
+        """Standard deviations of a value from the middle: ``value`` inverted."""
+        if self.low > 0:
+            share = log(value / self.low) / log(self.high / self.low)
+        else:
+            share = (value - self.low) / (self.high - self.low)
+        return DEVIATIONS * (2 * share - 1)
+
+
+def free_parameters(joint: str, path: str | Path | None = None) -> list[Free]:
+    """The free parameters of a joint, in the order of the parameter file.
+
+    Args:
+        joint: Its name.
+        path: The parameter file; by default the one that comes with mjhill.
+
+    Raises:
+        ValueError: There is no such joint, or bounds are not two ascending numbers that the
+            value lies between.
+    """
+    tables = tomllib.loads(Path(path or parameter_file()).read_text(encoding="utf-8"))
+    if joint not in tables:
+        raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(tables)}")
+    found = list(_entries(tables[joint], ()))
+    for free, value in found:
+        if not free.low < free.high or not free.low <= value <= free.high:
+            raise ValueError(
+                f"{joint}: {free.name} must have ascending bounds about its value {value:g}, "
+                f"got [{free.low:g}, {free.high:g}]"
+            )
+    return [free for free, _ in found]
+
+
+def _entries(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[tuple[Free, float]]:
+    for name, entry in table.items():
+        if not isinstance(entry, dict):
+            continue
+        if "bounds" in entry:
+            low, high = entry["bounds"]
+            yield Free((*path, name), float(low), float(high)), float(entry["value"])
+        elif "value" not in entry:
+            yield from _entries(entry, (*path, name))
+
+
+def joint_at(joint: Joint, free: Sequence[Free], deviations: NDArray[np.float64]) -> Joint:
+    """A joint with its free parameters at some deviations, shape (P,), from their middles."""
+    values: dict[tuple[str, ...], float] = {
+        item.path: item.value(z) for item, z in zip(free, deviations.tolist(), strict=True)
+    }
+
+    def under(*path: str) -> dict[str, Any]:
+        return {key[-1]: value for key, value in values.items() if key[:-1] == path}
+
+    muscles = {
+        name: replace(muscle, **under("muscles", name)) for name, muscle in joint.muscles.items()
+    }
+    return replace(
+        joint,
+        **under(),
+        passive=replace(joint.passive, **under("passive")),
+        muscles=MappingProxyType(muscles),
+        postures=MappingProxyType({**joint.postures, **under("postures")}),
+    )
+
+
+def value_of(joint: Joint, free: Free) -> float:
+    """The value that a free parameter has in a joint, in the parameter's unit."""
+    node: Any = joint
+    for key in free.path:
+        node = node[key] if isinstance(node, Mapping) else getattr(node, key)
+    return float(node)
