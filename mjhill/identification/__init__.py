@@ -1,0 +1,1 @@
+"""Identification: parameters fitted to measured movement."""
