@@ -19,8 +19,8 @@ def parameter_file() -> Path:
     return _DATA
 
 
-def read_joints(path: str | Path) -> dict[str, Joint]:
-    """The joints of a parameter file in the form of ``data/joints.toml``.
+def read_joints(path: str | Path | None = None) -> dict[str, Joint]:
+    """The joints of a parameter file in the form of ``data/joints.toml``, which is the default.
 
     Every value stands as ``name = { value = ..., source = "..." }``; further keys of an entry,
     such as the bounds of ``mjhill identify``, are not looked at.
@@ -30,10 +30,10 @@ def read_joints(path: str | Path) -> dict[str, Joint]:
         FileNotFoundError: There is no such file.
     """
     try:
-        tables = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        tables = tomllib.loads(Path(path or _DATA).read_text(encoding="utf-8"))
         return {name: _joint(name, table) for name, table in tables.items()}
     except (KeyError, TypeError, ValueError) as error:
-        raise ValueError(f"{path}: not a parameter file: {error}") from None
+        raise ValueError(f"{path or _DATA}: not a parameter file: {error}") from None
 
 
 class _Joints(Mapping[str, Joint]):
@@ -56,7 +56,7 @@ JOINTS: Mapping[str, Joint] = _Joints()
 
 @cache
 def _shipped() -> dict[str, Joint]:
-    return read_joints(_DATA)
+    return read_joints()
 
 
 def _joint(name: str, table: Mapping[str, Any]) -> Joint:

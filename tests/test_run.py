@@ -28,7 +28,7 @@ def test_recorded_force_is_the_force_that_mujoco_applies(pair):
         result = mjhill.record(pair, data, duration=0.2, excitation={"elbow_flexor": 0.8})
         mujoco.mj_forward(pair, data)
     assert result["elbow_flexor.force"][-1] == pytest.approx(-data.actuator_force[0], rel=1e-12)
-    assert result["elbow_flexor.force"][-1] > 5.0
+    assert result["elbow_flexor.force"][-1] > 1.0
 
 
 def test_recorded_velocity_is_the_rate_of_the_contractile_element(pair):
@@ -78,9 +78,9 @@ def test_a_run_goes_on_from_where_the_data_is(pair):
 def test_an_external_torque_moves_the_joint_the_way_it_points(pair):
     with mjhill.installed():
         result = mjhill.record(
-            pair, rest(pair, angle=1.396), duration=0.1, torque={"elbow": mjhill.pulse(5, 0, 0.05)}
+            pair, rest(pair, angle=1.3), duration=0.1, torque={"elbow": mjhill.pulse(5, 0, 0.05)}
         )
-    assert result["elbow.angle"][-1] > 1.45
+    assert result["elbow.angle"][-1] > 1.35
 
 
 def test_a_model_with_muscles_does_not_run_without_callbacks(pair):

@@ -4,6 +4,7 @@ import pytest
 from conftest import rest
 
 import mjhill
+from mjhill.elements import velocity_scale
 from mjhill.spec import joint_spec
 
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -33,7 +34,11 @@ def test_a_reset_is_a_valid_state_that_settles_without_a_jerk(pair, timestep):
     data = mujoco.MjData(pair)
     # lengthened by the passive torque, at less than V_max: eccentric plateau and viscosity
     most = [
-        (m.activation_floor * m.eccentric_plateau + m.viscosity) * m.max_isometric_force
+        (
+            m.activation_floor * m.eccentric_plateau
+            + m.viscosity / velocity_scale(m.activation_floor, m.velocity_activation)
+        )
+        * m.max_isometric_force
         for m in _muscles(pair)
     ]
     with mjhill.installed():
