@@ -17,6 +17,8 @@ from mjhill.spec import joint_spec
 
 _INPUTS = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 
+_Values = NDArray[np.float64]
+
 
 def angles(
     joints: Sequence[Joint],
@@ -28,37 +30,88 @@ def angles(
     torque: ArrayLike = 0.0,
     steps: int,
     timestep: float = 1e-3,
-) -> NDArray[np.float64]:
+) -> _Values:
     """Angle [rad] of each joint at every step, the start included, shape (N, steps + 1).
 
     Through MuJoCo and the compiled callbacks, one simulation a joint.
 
     Args:
-        joints: N joints that differ in numbers only: the same muscles and gears.
-        start: Angle at time 0 [rad], shape (N,).
-        velocity: Velocity at time 0 [rad/s], shape (N,).
+        joints: N joints that differ in numbers only: the same muscles, gears and inertia.
+        start: Angle at time 0 [rad], broadcast to (N,).
+        velocity: Velocity at time 0 [rad/s], broadcast to (N,).
         before: Input at which the muscles are steady at time 0, broadcast to (N, muscles).
         excitation: Input of each muscle over each step, broadcast to (N, steps, muscles).
         torque: External torque over each step [N·m], broadcast to (N, steps).
         steps: Number of steps.
         timestep: Length of a step [s].
     """
-    spec = joint_spec(joints[0])
-    spec.option.timestep = timestep
-    with without_python_callbacks():
-        model = spec.compile()
-    count, muscles = len(joints), len(joints[0].muscles)
-    batch = mujoco.batch.Batch(model, nsim=count)
-    _expand(batch, joints)
-    batch.qpos[:, 0], batch.qvel[:, 0] = start, velocity
-    batch.act[:] = _steady(joints, batch.qpos[:, 0], np.broadcast_to(before, (count, muscles)))
-    inputs = np.empty((count, steps, muscles + 1))
+    muscles = len(joints[0].muscles)
+    batch = _batch(joint_spec(joints[0]), joints, start, velocity, before, timestep)
+    inputs = np.empty((len(joints), steps, muscles + 1))
     inputs[:, :, :muscles], inputs[:, :, muscles] = excitation, torque
-    result = np.empty((count, steps + 1))
+    result = np.empty((len(joints), steps + 1))
     result[:, 0] = start
     with installed():
         result[:, 1:] = batch.rollout(steps, inputs, _INPUTS)["qpos"][:, :, 0]
     return result
+
+
+def driving_torques(
+    joints: Sequence[Joint],
+    *,
+    path: _Values,
+    before: ArrayLike = 0.0,
+    excitation: ArrayLike,
+    timestep: float = 1e-3,
+) -> _Values:
+    """External torque [N·m] that takes each joint along a path, shape (N, T).
+
+    The path is prescribed, as by a clamp without compliance; the torque is what balances the
+    joint's inertia, passive torque and muscles.
+
+    Args:
+        joints: N joints, as in ``angles``.
+        path: Angle at every step [rad], shape (T,).
+        before: As in ``angles``.
+        excitation: Input of each muscle over each step, shape (T, muscles).
+        timestep: Length of a step [s].
+    """
+    batch = _batch(joint_spec(joints[0]), joints, path[0], 0.0, before, timestep)
+    passive, muscles = batch.bind("qfrc_passive"), batch.bind("qfrc_actuator")
+    speed = np.diff(path, prepend=path[0]) / timestep  # the way the muscles have really come
+    inertial = joints[0].inertia * np.gradient(np.gradient(path, timestep), timestep)
+    result = np.empty((len(joints), len(path)))
+    inputs = np.asarray(excitation)
+    with installed():
+        for step in range(len(path)):
+            batch.qpos[:, 0], batch.qvel[:, 0], batch.ctrl[:] = (
+                path[step],
+                speed[step],
+                inputs[step],
+            )
+            batch.step()
+            result[:, step] = inertial[step] - passive[:, 0] - muscles[:, 0]
+    return result
+
+
+def _batch(
+    spec: mujoco.MjSpec,
+    joints: Sequence[Joint],
+    start: ArrayLike,
+    velocity: ArrayLike,
+    before: ArrayLike,
+    timestep: float,
+) -> mujoco.batch.Batch:
+    """A simulation for each joint, its muscles steady at the start."""
+    spec.option.timestep = timestep
+    with without_python_callbacks():
+        model = spec.compile()
+    batch = mujoco.batch.Batch(model, nsim=len(joints))
+    _expand(batch, joints)
+    batch.qpos[:, 0], batch.qvel[:, 0] = start, velocity
+    levels = np.broadcast_to(before, (len(joints), len(joints[0].muscles)))
+    batch.act[:] = _steady(joints, batch.qpos[:, 0], levels)
+    return batch
 
 
 def _expand(batch: mujoco.batch.Batch, joints: Sequence[Joint]) -> None:
@@ -75,9 +128,7 @@ def _expand(batch: mujoco.batch.Batch, joints: Sequence[Joint]) -> None:
         damping[i, 0] = joint.damping
 
 
-def _steady(
-    joints: Sequence[Joint], start: NDArray[np.float64], inputs: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _steady(joints: Sequence[Joint], start: _Values, inputs: _Values) -> _Values:
     """States n, a, s of every muscle, steady at a start angle and its inputs."""
     act = []
     for joint, angle, levels in zip(joints, start.tolist(), inputs.tolist(), strict=True):

@@ -3,33 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from math import degrees
 from pathlib import Path
 from typing import Any
 
 from mjhill.identification.evidence import Evidence, evidence_on
-from mjhill.identification.free import Free, free_parameters, joint_at
-from mjhill.identification.solve import Estimate, solve
+from mjhill.identification.free import free_parameters, joint_at
+from mjhill.identification.identified import Identified
+from mjhill.identification.solve import solve
 from mjhill.joints import read_joints
 from mjhill.parameters import Joint
 
-_EQUAL_POLES = 1.3  # ratio of T1 to T2 below which the two say little singly
-
-
-@dataclass(frozen=True)
-class Identified:
-    """A joint with its free parameters fitted.
-
-    Attributes:
-        joint: The fitted joint.
-        free: The parameters that were free.
-        estimates: Their values and confidence, in the same order.
-    """
-
-    joint: Joint
-    free: tuple[Free, ...]
-    estimates: tuple[Estimate, ...]
+_NEAR = 1.3  # ratio of T1 to T2 below which the two say little singly
 
 
 def from_literature(
@@ -65,7 +50,7 @@ def step_rows(joint: Joint) -> list[dict[str, Any]]:
     evidence = evidence_on(joint)
     rows = []
     for (muscle, row), fit in zip(evidence.steps, evidence.fits(joint), strict=True):
-        published = [1e3 * constant for constant in row.time_constants]
+        wanted = [1e3 * constant for constant in row.time_constants]
         found = [1e3 * constant for constant in fit.time_constants]
         rows.append(
             {
@@ -75,11 +60,13 @@ def step_rows(joint: Joint) -> list[dict[str, Any]]:
                 "MAG [°]": degrees(row.magnitude),
                 "ours [°]": degrees(fit.magnitude),
                 "off [%]": 100 * (fit.magnitude / row.magnitude - 1),
-                "T1, T2 [ms]": published,
-                "ours [ms]": found,
-                "T1 + T2 off [%]": 100 * (sum(found) / sum(published) - 1),
-                "misfit [%]": 100 * fit.misfit,
-                "ill-conditioned": min(_ratio(published), _ratio(found)) < _EQUAL_POLES,
+                "T1 [ms]": wanted[0],
+                "T2 [ms]": wanted[1],
+                "our T1 [ms]": found[0],
+                "our T2 [ms]": found[1],
+                "T1 + T2 off [%]": 100 * (sum(found) / sum(wanted) - 1),
+                "fit leaves [%]": 100 * fit.misfit,
+                "split": "ill-conditioned" if min(map(_ratio, (wanted, found))) < _NEAR else "",
                 "note": row.note,
             }
         )

@@ -64,32 +64,37 @@ class Solution:
 
     def estimates(self, free: Sequence[Free]) -> list[Estimate]:
         """The parameters with their confidence."""
-        spreads = np.sqrt(np.diag(self.covariance))
-        return [
-            Estimate(
-                item.name,
-                item.value(z),
-                item.value(z - 1.96 * spread),
-                item.value(z + 1.96 * spread),
-                (item.low, item.high),
-                max(0.0, 1.0 - spread**2),
-                abs(z) > DEVIATIONS - _NEAR,
-            )
-            for item, z, spread in zip(
-                free, self.deviations.tolist(), spreads.tolist(), strict=True
-            )
-        ]
+        spreads = np.sqrt(np.diag(self.covariance)).tolist()
+        known = zip(self.deviations.tolist(), spreads, strict=True)
+        # what was fitted besides, such as starting velocities, comes after the parameters
+        return [_estimate(item, z, spread) for item, (z, spread) in zip(free, known, strict=False)]
+
+
+def _estimate(free: Free, deviation: float, spread: float) -> Estimate:
+    return Estimate(
+        free.name,
+        free.value(deviation),
+        free.value(deviation - 1.96 * spread),
+        free.value(deviation + 1.96 * spread),
+        (free.low, free.high),
+        max(0.0, 1.0 - spread**2),
+        abs(deviation) > DEVIATIONS - _NEAR,
+    )
 
 
 def solve(
-    residuals: Residuals, count: int, progress: Callable[[float], None] | None = None
+    residuals: Residuals,
+    count: int,
+    progress: Callable[[float], None] | None = None,
+    start: NDArray[np.float64] | None = None,
 ) -> Solution:
-    """Fit ``count`` free parameters, starting from the middles of their bounds.
+    """Fit ``count`` free parameters.
 
     Args:
         residuals: What the data say; the priors are added here.
         count: P, the number of free parameters.
         progress: Called with the share done, 0 to 1, guessed from the steps so far.
+        start: Deviations to start from, shape (P,); by default the middles of the bounds.
 
     Raises:
         RuntimeError: The solver stopped short of an optimum.
@@ -104,7 +109,7 @@ def solve(
 
     bounds = [np.full(count, -DEVIATIONS), np.full(count, DEVIATIONS)]
     point, trace = mujoco.minimize.least_squares(
-        np.zeros(count),
+        np.zeros(count) if start is None else start,
         all_residuals,
         bounds,
         eps=_DIFFERENCE,

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from mjhill.files import replacing
-from mjhill.identification.literature import Identified
+from mjhill.identification.identified import Identified
 from mjhill.joints import parameter_file
 
 _DIGITS = 4  # significant

@@ -1,19 +1,19 @@
-"""The command line: demo, list, info, run, video, compare, bench."""
+"""The commands: demo, list, info, run, video, compare, bench; identify has a file of its own."""
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
 
+from mjhill.cli.identify import identify
+from mjhill.cli.printing import json_option, print_paths, print_table, progress_bar, shown
+
 _OUT = Path("out")
 _SUFFIXES = {"recording": (".csv", ".npz"), "plot": (".png",), "video": (".mp4", ".gif")}
-Progress = Callable[[float], None]
 
 
 class _Group(click.Group):
@@ -40,6 +40,9 @@ def main() -> None:
     """Physiological muscle for MuJoCo: the Hill-based system of Winters & Stark (1987)."""
 
 
+main.add_command(identify)
+
+
 def _inputs_option(function: Any) -> Any:
     return click.option(
         "--excite",
@@ -50,12 +53,9 @@ def _inputs_option(function: Any) -> Any:
     )(function)
 
 
-_json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-
-
 @main.command()
 @click.option("--output", "-o", type=click.Path(path_type=Path), default=_OUT, help="Folder.")
-@_json_option
+@json_option
 def demo(output: Path, as_json: bool) -> None:
     """Run the elbow through its scripted movement; write video, plot and recording."""
     files = {
@@ -69,7 +69,7 @@ def demo(output: Path, as_json: bool) -> None:
 
 
 @main.command("list")
-@_json_option
+@json_option
 def list_(as_json: bool) -> None:
     """List the joints that come with mjhill."""
     from mjhill.joints import JOINTS
@@ -83,13 +83,13 @@ def list_(as_json: bool) -> None:
         }
         for joint in JOINTS.values()
     ]
-    _table(rows, as_json, title="Joints")
+    print_table(rows, as_json, title="Joints")
 
 
 @main.command()
 @click.argument("model")
 @click.option("--mjcf", is_flag=True, help="Print the MJCF of the muscles instead.")
-@_json_option
+@json_option
 def info(model: str, mjcf: bool, as_json: bool) -> None:
     """Show the parameters of MODEL, a joint's name or a path, with units and sources."""
     from mjhill.describe import rows
@@ -98,7 +98,7 @@ def info(model: str, mjcf: bool, as_json: bool) -> None:
     if mjcf:
         click.echo(snippet(model))
         return
-    _table(rows(model), as_json, title=model)
+    print_table(rows(model), as_json, title=model)
 
 
 @main.command()
@@ -108,7 +108,7 @@ def info(model: str, mjcf: bool, as_json: bool) -> None:
 @click.option("--duration", "-d", default=4.0, show_default=True, help="Length [s].")
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="Recording, .csv or .npz.")
 @click.option("--plot", "-p", type=click.Path(path_type=Path), help="Picture, .png.")
-@_json_option
+@json_option
 def run(
     model: str,
     excite: tuple[str, ...],
@@ -136,7 +136,7 @@ def run(
 @click.option("--speed", default=1.0, show_default=True, help="1 is real time, less is slow.")
 @click.option("--size", nargs=2, type=int, default=(1280, 720), show_default=True)
 @click.option("--camera", help="Camera of the model.")
-@_json_option
+@json_option
 def video(model: str, excite: tuple[str, ...], as_json: bool, **options: Any) -> None:
     """Film MODEL, a joint's name or a path, without a screen."""
     output = options.pop("output") or _OUT / f"{Path(model).stem}.mp4"
@@ -152,46 +152,46 @@ def video(model: str, excite: tuple[str, ...], as_json: bool, **options: Any) ->
 @click.option("--output", "-o", type=click.Path(path_type=Path), default=_OUT / "compare")
 @click.option("--video/--no-video", default=True, show_default=True)
 @click.option("--cost/--no-cost", default=True, show_default=True, help="Time the steps too.")
-@_json_option
+@json_option
 def compare(model: str, output: Path, video: bool, cost: bool, as_json: bool) -> None:
     """Compare MODEL's muscles with MuJoCo's own on the same plant and inputs."""
     from dataclasses import asdict, replace
 
     from mjhill import comparison
 
-    with _progress("comparing") as progress:
+    with progress_bar("comparing") as progress:
         result = comparison.compare(model, progress=progress)
     if cost:
-        with _progress("timing steps") as progress:
+        with progress_bar("timing steps") as progress:
             result = replace(result, cost=comparison.step_cost(model, progress=progress))
-    with _progress("writing") as progress:
+    with progress_bar("writing") as progress:
         paths = comparison.write(result, output, video=video, progress=progress)
     if as_json:
         click.echo(json.dumps(result.as_dict(), ensure_ascii=False))
         return
-    _table([asdict(match) for match in result.matching], False, title="What is matched")
+    print_table([asdict(match) for match in result.matching], False, title="What is matched")
     rows = [{**asdict(row), "ratio": row.ratio} for row in result.rows]
-    _table(rows, False, title="What differs")
+    print_table(rows, False, title="What differs")
     if result.cost:
-        _table([result.cost.as_dict()], False, title="Cost of a step [µs]", across=False)
-    _paths({path.name: path for path in paths})
+        print_table([result.cost.as_dict()], False, title="Cost of a step [µs]", across=False)
+    print_paths({path.name: path for path in paths})
 
 
 @main.command()
 @click.argument("names", nargs=-1)
-@_json_option
+@json_option
 def bench(names: tuple[str, ...], as_json: bool) -> None:
     """Measure accuracy, cost, threads, start and video, or those of NAMES."""
     from mjhill import bench as benchmarks
 
-    with _progress("measuring") as progress:
+    with progress_bar("measuring") as progress:
         results = benchmarks.run(names, progress)
     if as_json:
         click.echo(json.dumps({name: result.rows for name, result in results.items()}))
         return
     click.echo(benchmarks.versions())
     for result in results.values():
-        _table(result.rows, False, title=result.title)
+        print_table(result.rows, False, title=result.title)
         for note in result.notes:
             click.echo(f"  {note}")
 
@@ -213,7 +213,7 @@ def _film(
             wanted = " or ".join(_SUFFIXES[kind])
             raise ValueError(f"{kind} {str(path)!r} must end in {wanted}")
         check_writable(path)
-    with _progress("running") as progress:
+    with progress_bar("running") as progress:
         loaded, recording = scripted.run(model, excitation, torque or {}, duration, progress)
     if "recording" in files:
         recording.save(files["recording"])
@@ -224,7 +224,7 @@ def _film(
     if "video" in files:
         from mjhill.rendering import View, render
 
-        with _progress("filming") as progress:
+        with progress_bar("filming") as progress:
             render(
                 View(loaded, recording),
                 files["video"],
@@ -265,41 +265,6 @@ def _parse(items: tuple[str, ...]) -> dict[str, Any]:
     return signals
 
 
-@contextmanager
-def _progress(what: str) -> Iterator[Progress]:
-    from rich.console import Console
-    from rich.progress import Progress as Bars
-
-    console = Console(stderr=True)
-    with Bars(console=console, transient=True, disable=not console.is_terminal) as bars:
-        bar = bars.add_task(what, total=1.0)
-        yield lambda share: bars.update(bar, completed=share)
-
-
-def _table(rows: list[dict[str, Any]], as_json: bool, title: str, across: bool = True) -> None:
-    if as_json:
-        click.echo(json.dumps(rows, ensure_ascii=False))
-        return
-    from rich.console import Console
-    from rich.table import Table
-
-    if not across:
-        rows = [{"quantity": key, "value": value} for row in rows for key, value in row.items()]
-    table = Table(title=title, title_justify="left")
-    for column in rows[0] if rows else []:
-        table.add_column(column)
-    for row in rows:
-        table.add_row(*(_cell(value) for value in row.values()))
-    # a pipe has no width of its own; rich would cut the sources at 80 columns
-    Console(width=None if sys.stdout.isatty() else 160).print(table)
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return ""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
 def _summary(recording: Any, files: dict[str, Path], as_json: bool) -> None:
     from mjhill.scripted import summary
 
@@ -309,11 +274,5 @@ def _summary(recording: Any, files: dict[str, Path], as_json: bool) -> None:
         click.echo(json.dumps({"files": paths, **numbers}, ensure_ascii=False))
         return
     for name, value in numbers.items():
-        click.echo(f"{name}: {_cell(value)}")
-    _paths(files)
-
-
-def _paths(files: dict[str, Path]) -> None:
-    width = max(map(len, files))
-    for name, path in files.items():
-        click.echo(f"{name:<{width}}  {path}")
+        click.echo(f"{name}: {shown(value)}")
+    print_paths(files)

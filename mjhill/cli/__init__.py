@@ -1,0 +1,3 @@
+"""The command line ``mjhill``."""
+
+from mjhill.cli.commands import main as main

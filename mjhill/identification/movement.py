@@ -1,0 +1,223 @@
+"""A joint identified from measurements of its movement, or of the torque that holds it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjhill.identification.ensemble import angles, driving_torques
+from mjhill.identification.free import Free, free_parameters, joint_at
+from mjhill.identification.identified import Identified
+from mjhill.identification.measurement import Measurement
+from mjhill.identification.solve import Solution, solve
+from mjhill.joints import read_joints
+from mjhill.parameters import Joint
+
+PREDICTIONS = ("angle", "torque")
+_HELD = 0.02  # [rad], a joint that moves less is taken as held still
+_SMOOTHING = 10.0  # [Hz], cut-off of the path of a driven joint, usual for human movement
+_LONGEST_STEP = 1e-3  # [s]
+_FIRST_NOISE = 0.02  # of the spread of what is predicted, until the fit says better
+_LEAST_NOISE = 1e-4  # of that spread: no simulation is nearer to a joint
+_ROUNDS = 4
+_START_SPAN = 0.05  # [s] from whose samples the starting velocity is guessed
+
+_Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A measurement beside what the fitted joint does under its inputs.
+
+    Attributes:
+        measurement: The measurement.
+        quantity: What is predicted: ``angle`` [rad] or ``torque`` [N·m].
+        measured: That quantity as measured, shape (T,).
+        predicted: As predicted.
+    """
+
+    measurement: Measurement
+    quantity: str
+    measured: _Values
+    predicted: _Values
+
+    @property
+    def error(self) -> float:
+        """Root mean square of the difference, in the quantity's unit."""
+        return float(np.sqrt(np.mean((self.predicted - self.measured) ** 2)))
+
+    @property
+    def explained(self) -> float:
+        """Share of the measured variance that the prediction accounts for [-]."""
+        return 1.0 - float(np.var(self.predicted - self.measured) / np.var(self.measured))
+
+
+def from_measurements(
+    joint: str,
+    measurements: Sequence[Measurement],
+    *,
+    predict: str | None = None,
+    only: Sequence[str] = (),
+    parameters: str | Path | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[Identified, list[Prediction]]:
+    """Fit the free parameters of a joint to measurements of one subject.
+
+    Each measurement starts with muscles steady at its first inputs. Its inputs hold from sample
+    to sample. The priors are those of ``mjhill.identification.free``: a parameter that the data
+    say nothing about stays in the middle of its bounds, and ``Estimate.informed`` tells.
+
+    Args:
+        joint: The joint's name.
+        measurements: One or more.
+        predict: ``angle``: move the joint by the measured torque and compare angles; ``torque``:
+            drive it along the measured angle and compare torques. By default torque where the
+            angle stays within 0.02 rad, angle elsewhere.
+        only: Names of the parameters to fit, by default all that have bounds; the others keep
+            the value of the parameter file.
+        parameters: The parameter file; by default the one that comes with mjhill.
+        progress: Called with the share done, 0 to 1.
+
+    Raises:
+        ValueError: The joint or a parameter is unknown, there is no measurement, or ``predict``
+            is neither.
+        RuntimeError: The fit did not settle.
+    """
+    if not measurements:
+        raise ValueError("there is no measurement to fit; give at least one")
+    if predict not in (None, *PREDICTIONS):
+        raise ValueError(f"predict must be one of {', '.join(PREDICTIONS)}, got {predict!r}")
+    free = _chosen(free_parameters(joint, parameters), only, joint)
+    start = read_joints(parameters)[joint]
+    trials = [_Trial(start, measurement, predict) for measurement in measurements]
+    solution = _solve(start, free, trials, progress)
+    fitted = joint_at(start, free, solution.deviations[: len(free)])
+    predictions = []
+    for trial, offset in zip(trials, _offsets(solution.deviations, len(free)), strict=True):
+        predicted = trial.predict([fitted], offset[None])[0]
+        predictions.append(Prediction(trial.measurement, trial.quantity, trial.measured, predicted))
+    return Identified(fitted, tuple(free), tuple(solution.estimates(free))), predictions
+
+
+def _chosen(free: list[Free], only: Sequence[str], joint: str) -> list[Free]:
+    names = [item.name for item in free]
+    for name in only:
+        if name not in names:
+            raise ValueError(
+                f"{joint}: unknown free parameter {name!r}; there are: {', '.join(names)}"
+            )
+    # where a step of Table 2 starts is no property of the subject
+    return [f for f in free if (f.name in only if only else f.path[0] != "postures")]
+
+
+def _solve(
+    start: Joint,
+    free: list[Free],
+    trials: list[_Trial],
+    progress: Callable[[float], None] | None,
+) -> Solution:
+    """Fit, take the noise from what is left, and fit again until it no longer changes."""
+    count = len(free) + len(trials)  # a starting velocity for each trial besides
+    weights = [1.0 / (_FIRST_NOISE * trial.spread) for trial in trials]
+
+    def residuals(points: _Values) -> _Values:
+        joints = [joint_at(start, free, point[: len(free)]) for point in points.T]
+        parts = [
+            weight * (trial.predict(joints, points[len(free) + k]) - trial.measured)
+            for k, (trial, weight) in enumerate(zip(trials, weights, strict=True))
+        ]
+        return np.ascontiguousarray(np.concatenate(parts, axis=1).T)
+
+    point = np.zeros(count)
+    for stage in range(_ROUNDS):
+        done = stage / _ROUNDS
+        report = (lambda share, d=done: progress(d + share / _ROUNDS)) if progress else None
+        solution = solve(residuals, count, report, start=point)
+        point = solution.deviations
+        joint = joint_at(start, free, point[: len(free)])
+        before = weights
+        weights = [
+            trial.weight(trial.predict([joint], offset[None])[0])
+            for trial, offset in zip(trials, _offsets(point, len(free)), strict=True)
+        ]
+        if np.allclose(weights, before, rtol=0.02):
+            break
+    return solution
+
+
+def _offsets(deviations: _Values, free: int) -> _Values:
+    """The starting velocity of each trial, in deviations, shape (trials, 1)."""
+    return deviations[free:, None]
+
+
+class _Trial:
+    """A measurement made ready: its inputs on a grid of steps, what is to be predicted."""
+
+    def __init__(self, joint: Joint, measurement: Measurement, predict: str | None) -> None:
+        from scipy.stats import linregress
+
+        held = np.ptp(measurement.angle) < _HELD
+        self.measurement = measurement
+        self.quantity = predict or ("torque" if held else "angle")
+        self.measured = getattr(measurement, self.quantity)
+        self.spread = max(float(np.ptp(self.measured)), 1e-9)
+        self._time = measurement.time - measurement.time[0]
+        interval = float(np.median(np.diff(self._time)))
+        self._timestep = min(_LONGEST_STEP, interval)
+        self._grid = np.arange(int(np.ceil(self._time[-1] / self._timestep)) + 1) * self._timestep
+        latest = np.searchsorted(self._time, self._grid + 1e-9, side="right") - 1
+        excitation = np.stack([measurement.excitation[name] for name in joint.muscles], axis=1)
+        self._before, self._excitation = excitation[0], excitation[latest]
+        self._torque = measurement.torque[latest]
+        self._path = self._smooth_path(interval) if self.quantity == "torque" else None
+        first = self._time <= max(_START_SPAN, 5 * interval)
+        line = linregress(self._time[first], measurement.angle[first])
+        self._velocity, self._velocity_spread = float(line.slope), float(line.stderr) + 1e-6
+
+    def predict(self, joints: Sequence[Joint], offsets: _Values) -> _Values:
+        """What joints do, shape (joints, T), with deviations of their starting velocities."""
+        if self._path is not None:
+            run = driving_torques(
+                joints,
+                path=self._path,
+                before=self._before,
+                excitation=self._excitation,
+                timestep=self._timestep,
+            )
+        else:
+            run = angles(
+                joints,
+                start=self.measurement.angle[0],
+                velocity=self._velocity + self._velocity_spread * np.asarray(offsets),
+                before=self._before,
+                excitation=self._excitation[:-1],
+                torque=self._torque[:-1],
+                steps=len(self._grid) - 1,
+                timestep=self._timestep,
+            )
+        return np.array([np.interp(self._time, self._grid, row) for row in run])
+
+    def weight(self, predicted: _Values) -> float:
+        """Weight of a residual, from what a prediction leaves.
+
+        Residuals that hang together count as fewer: a series with correlation r from sample to
+        sample is worth (1 - r)/(1 + r) of its samples.
+        """
+        left = predicted - self.measured
+        noise = max(float(np.sqrt(np.mean(left**2))), _LEAST_NOISE * self.spread)
+        size = float(left @ left)
+        correlation = min(max(float(left[1:] @ left[:-1]) / size, 0.0), 0.999) if size else 0.0
+        return float(np.sqrt((1 - correlation) / (1 + correlation))) / noise
+
+    def _smooth_path(self, interval: float) -> _Values:
+        from scipy.signal import butter, sosfiltfilt
+
+        path = np.interp(self._grid, self._time, self.measurement.angle)
+        if np.ptp(path) < _HELD:
+            return np.full_like(path, float(np.mean(path)))
+        sections = butter(2, min(_SMOOTHING, 0.4 / interval), fs=1 / self._timestep, output="sos")
+        return np.asarray(sosfiltfilt(sections, path))
