@@ -1,0 +1,317 @@
+"""The facts are measured on a joint made here, whose truths do not depend on the parameter file."""
+
+from dataclasses import replace
+from math import radians
+
+import numpy as np
+import pytest
+
+import mjhill
+from mjhill.identification.facts import Fact, facts, read_entries
+from mjhill.identification.free_velocity import free_velocity
+from mjhill.identification.impedance import held_impedance, passive_stiffness, stiffness_slope
+from mjhill.identification.rig import (
+    UnmeasuredError,
+    angles,
+    holding,
+    muscle_torque,
+    rig,
+    run,
+    still,
+    strongest_angle,
+)
+from mjhill.identification.turn import turn
+from mjhill.identification.twitch import twitch
+from mjhill.reference import plant_torque
+
+MUSCLE = mjhill.Muscle(
+    max_isometric_force=10.0,
+    optimal_length=0.0,
+    width_short=1.2,
+    width_long=1.2,
+    max_velocity=15.0,
+    hill_shape=0.3,
+    series_stretch=0.2,
+    excitation_tau=0.03,
+    activation_tau=0.01,
+    deactivation_tau=0.04,
+)
+NO_ELASTICITY = mjhill.Passive(k1_pos=0.0, k2_pos=1.0, k1_neg=0.0, k2_neg=1.0)
+
+ENTRY = """
+[[fact]]
+joint = "knee"
+muscle = "knee_extensor"
+measure = "free_velocity"
+quantity = "speed"
+unit = "rad/s"
+low = 1.0
+high = 2.0
+source = "none"
+"""
+
+
+def make_joint(muscle: mjhill.Muscle = MUSCLE, **changes) -> mjhill.Joint:
+    values = {
+        "name": "joint",
+        "positive": "right",
+        "inertia": 0.01,
+        "damping": 0.05,
+        "stiffness": 1.0,
+        "rest_angle": 0.0,
+        "passive": NO_ELASTICITY,
+        "range": (-1.2, 1.2),
+        "home_angle": 0.0,
+        "muscles": {"puller": muscle, "opponent": muscle},
+        "gears": {"puller": -1.0, "opponent": 1.0},
+    }
+    return mjhill.Joint(**{**values, **changes})
+
+
+def turn_of(joint, degrees, braked):
+    return turn(joint, "puller", amplitude=radians(degrees), duration=0.5, braked=braked)
+
+
+# --- the bench
+
+
+def test_a_search_sees_the_angles_of_the_recorded_run_bit_for_bit():
+    bench = rig(make_joint())
+    inputs = {"puller": mjhill.pulse(1.0, 0.0, 0.05), "opponent": mjhill.pulse(1.0, 0.05, 0.03)}
+    start = still(bench, 0.2)
+    searched = angles(bench, start, 0.2, inputs)
+    assert np.array_equal(searched, run(bench, start, 0.2, excitation=inputs)["joint.angle"])
+
+
+@pytest.mark.parametrize("angle", [-0.5, 0.0, 0.5])
+def test_a_joint_stays_where_it_is_held(angle):
+    joint = make_joint()
+    bench, levels = rig(joint), holding(joint, "puller", angle)
+    end = run(bench, still(bench, angle, levels), 0.5, excitation=levels)["joint.angle"][-1]
+    assert end == pytest.approx(angle, abs=1e-6)
+
+
+def test_a_joint_too_stiff_for_its_muscle_is_not_held():
+    with pytest.raises(UnmeasuredError, match="full input of puller does not hold joint"):
+        holding(make_joint(stiffness=100.0), "puller", 0.5)
+
+
+# --- turns
+
+
+@pytest.mark.parametrize("braked", [False, True])
+def test_a_turn_goes_its_amplitude_and_no_farther(braked):
+    joint = make_joint(damping=0.3)  # well damped, so that it needs no brake
+    for degrees in (5, 40):
+        found = turn_of(joint, degrees, braked)
+        assert found.progress.max() == pytest.approx(1.0, abs=1e-3)
+        assert found.progress[-1] == pytest.approx(1.0, abs=0.06)
+
+
+@pytest.mark.parametrize("braked", [False, True])
+def test_peak_velocity_and_duration_rise_with_the_amplitude_of_a_turn(braked):
+    turns = [turn_of(make_joint(damping=0.3), degrees, braked) for degrees in (5, 20, 60)]
+    assert (np.diff([one.peak_velocity for one in turns]) > 0).all()
+    assert (np.diff([one.duration(radians(30.0)) for one in turns]) > 0).all()
+
+
+def test_a_brake_makes_a_turn_faster_and_its_pulse_wider():
+    joint = make_joint(damping=0.3)
+    free, braked = turn_of(joint, 40, False), turn_of(joint, 40, True)
+    assert free.brake == 0 < braked.brake
+    assert braked.pulse > free.pulse
+    assert braked.peak_velocity > free.peak_velocity
+
+
+def test_turns_of_mirrored_muscles_are_mirrored():
+    joint = make_joint(damping=0.3)
+    there, back = (
+        turn(joint, name, amplitude=0.5, duration=0.5, braked=True) for name in joint.muscles
+    )
+    assert back.pulse == pytest.approx(there.pulse)
+    # exact searches, but sums of torques in another order
+    np.testing.assert_allclose(back.velocity, there.velocity, atol=1e-6)
+
+
+def test_a_turn_that_swings_past_by_itself_needs_a_brake():
+    joint = make_joint(damping=0.01)
+    with pytest.raises(UnmeasuredError, match="even without a pulse"):
+        turn_of(joint, 30, False)
+    assert turn_of(joint, 30, True).progress.max() == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_turn_wider_than_the_range_or_too_far_for_its_time_is_not_measured():
+    with pytest.raises(UnmeasuredError, match="wider than the range"):
+        turn_of(make_joint(), 150, False)
+    with pytest.raises(UnmeasuredError, match="does not turn it by 60° in 0.02 s"):
+        turn(make_joint(), "puller", amplitude=radians(60), duration=0.02)
+
+
+# --- twitches
+
+
+def test_a_twitch_peaks_later_and_relaxes_more_slowly_with_larger_time_constants():
+    fast = twitch(make_joint(), "puller")
+    slow = twitch(make_joint(replace(MUSCLE, excitation_tau=0.06, deactivation_tau=0.08)), "puller")
+    assert slow.contraction > fast.contraction > 0
+    assert slow.half_relaxation > fast.half_relaxation > 0
+    assert 0 < fast.share < 1
+
+
+def test_a_twitch_is_isometric_at_the_angle_of_the_largest_force():
+    joint = make_joint(replace(MUSCLE, optimal_length=0.3))
+    angle = twitch(joint, "puller").run["joint.angle"]
+    assert angle[0] == pytest.approx(-0.3)
+    assert np.ptp(angle) < 1e-6
+    assert strongest_angle(make_joint(range=(-0.1, 1.0)), "puller") == 0.0
+    assert strongest_angle(replace(joint, range=(-0.1, 1.0)), "puller") == -0.1
+
+
+# --- velocity
+
+
+def test_no_muscle_turns_a_free_joint_faster_than_it_can_shorten():
+    for inertia in (0.0005, 0.01, 0.1):
+        joint = make_joint(inertia=inertia, stiffness=0.0)  # nothing else pushes it
+        assert 0 < free_velocity(joint, "puller") < MUSCLE.max_velocity
+
+
+def test_a_light_joint_comes_near_the_largest_velocity_of_its_muscle():
+    even = replace(MUSCLE, width_short=20.0, width_long=20.0)  # as strong at any length
+    joint = make_joint(even, inertia=1e-3, damping=0.0, stiffness=0.0, range=(-3.0, 1.0))
+    assert free_velocity(joint, "puller") > 0.9 * MUSCLE.max_velocity
+
+
+# --- stiffness
+
+
+def limp_joint(stiffness: float) -> mjhill.Joint:
+    limp = replace(MUSCLE, max_isometric_force=1e-9)
+    return make_joint(limp, stiffness=stiffness, damping=0.2)
+
+
+@pytest.mark.parametrize("stiffness", [5.0, 40.0])
+def test_a_hit_finds_the_stiffness_and_damping_of_a_joint_without_muscle(stiffness):
+    found = held_impedance(limp_joint(stiffness), "puller", share=0.0, angle=0.1)
+    # the fit sums over steps of 1 ms
+    assert found.stiffness == pytest.approx(stiffness, rel=0.01)
+    assert found.damping == pytest.approx(0.2, rel=0.01)
+    assert found.damping_ratio == pytest.approx(0.2 / (2 * np.sqrt(0.01 * stiffness)), rel=0.02)
+    assert found.explained > 0.999
+
+
+def test_passive_stiffness_is_the_mean_slope_at_rest():
+    assert passive_stiffness(make_joint(stiffness=7.0), 0.02) == pytest.approx(7.0)
+    passive = mjhill.Passive(k1_pos=0.5, k2_pos=2.0, k1_neg=0.25, k2_neg=2.0)
+    joint = make_joint(passive=passive, rest_angle=0.3)
+    # 1 of the spring, k1 k2 of each side
+    assert passive_stiffness(joint, 1e-5) == pytest.approx(1.0 + (1.0 + 0.5) / 2, rel=1e-3)
+
+
+def test_a_joint_is_stiffer_the_more_its_muscle_holds():
+    joint = make_joint(damping=0.2)
+    held = [held_impedance(joint, "puller", share=share, angle=0.0) for share in (0.1, 0.3)]
+    assert held[1].torque > held[0].torque > 0
+    assert held[1].stiffness > held[0].stiffness > joint.stiffness
+    rise = held[1].stiffness - held[0].stiffness
+    slope = stiffness_slope(joint, "puller", shares=[0.1, 0.3], angle=0.0)
+    assert slope == pytest.approx(rise / (held[1].torque - held[0].torque))
+
+
+def test_the_load_balances_muscle_and_elasticity_and_the_hit_deflects_by_a_degree():
+    joint = make_joint()
+    found = held_impedance(joint, "puller", share=0.3, angle=0.2)
+    torque = sum(
+        muscle_torque(joint, name, u, 0.2) for name, u in {"puller": 0.3, "opponent": 0.0}.items()
+    )
+    assert found.run["joint.applied"][-1] == pytest.approx(-(torque + plant_torque(joint, 0.2)))
+    assert np.ptp(found.run["joint.angle"]) == pytest.approx(radians(1.0), rel=0.06)
+
+
+def test_an_unstable_posture_is_not_measured():
+    # past the optimum a quick muscle on a stiff tendon pulls less the more it is stretched
+    muscle = replace(MUSCLE, width_long=0.3, max_velocity=1000.0, series_stretch=0.01)
+    joint = make_joint(muscle, stiffness=0.0)
+    with pytest.raises(UnmeasuredError, match="yields instead of coming back"):
+        held_impedance(joint, "puller", share=0.5, angle=-0.25)
+
+
+# --- the facts
+
+
+def test_every_fact_is_about_a_muscle_of_a_joint_and_has_an_interval_and_a_source():
+    entries = read_entries()
+    assert len({(entry.joint, entry.quantity) for entry in entries}) == len(entries) > 0
+    for entry in entries:
+        assert entry.muscle in mjhill.JOINTS[entry.joint].muscles
+        assert 0 < entry.low < entry.high
+        assert entry.source
+        assert entry.quantity
+
+
+def test_every_fact_is_measured_or_says_why_it_is_not():
+    shares: list[float] = []
+    found = facts(progress=shares.append)
+    assert [fact.joint for fact in found] == [entry.joint for entry in read_entries()]
+    for fact in found:
+        assert (fact.measured is None) == bool(fact.note)
+        assert fact.measured is None or np.isfinite(fact.measured)
+    assert shares[-1] == 1.0
+    assert shares == sorted(shares)
+
+
+def test_only_the_joints_given_are_measured_with_the_parameters_given():
+    knee = mjhill.JOINTS["knee"]
+    extensor = replace(knee.muscles["knee_extensor"], max_isometric_force=20.0)
+    weak = replace(knee, muscles={**knee.muscles, "knee_extensor": extensor})
+    (usual,) = facts({"knee": knee})
+    (slower,) = facts({"knee": weak})
+    assert (slower.quantity, slower.low, slower.high) == (usual.quantity, usual.low, usual.high)
+    assert slower.measured < usual.measured
+    assert facts({"hip": mjhill.JOINTS["hip"]}) == []
+
+
+def test_velocities_are_given_in_the_unit_of_the_publication():
+    eye = mjhill.JOINTS["eye"]
+    fact = facts({"eye": eye})[0]
+    saccade = turn(eye, "lateral_rectus", amplitude=radians(5), duration=0.2)
+    assert fact.unit == "°/s"
+    assert fact.measured == pytest.approx(np.degrees(saccade.peak_velocity))
+
+
+def test_a_fact_is_within_its_interval_ends_included():
+    def within(measured):
+        return Fact("eye", "speed", "°/s", 1.0, 2.0, "none", measured).within
+
+    assert [within(value) for value in (0.9, 1.0, 1.5, 2.0, 2.1, None)] == [
+        False, True, True, True, False, None,
+    ]  # fmt: skip
+
+
+def test_what_cannot_be_measured_is_reported_with_its_reason():
+    stuck = replace(mjhill.JOINTS["eye"], stiffness=10.0)
+    for fact in facts({"eye": stuck}):
+        assert fact.measured is None
+        assert fact.within is None
+        assert "full input of medial_rectus does not hold eye" in fact.note
+
+
+def test_names_that_do_not_exist_are_refused_with_those_that_do(tmp_path):
+    eye = mjhill.JOINTS["eye"]
+    with pytest.raises(ValueError, match="unknown joint 'toe'; there are: elbow, "):
+        facts({"toe": eye})
+    with pytest.raises(ValueError, match="unknown muscle 'knee_extensor'; there are: lateral"):
+        facts({"knee": eye})
+    for old, new, message in (
+        ("free_velocity", "magic", "unknown measure 'magic'; there are: .*twitch_share"),
+        ("rad/s", "knots", "unknown unit 'knots'; there are: .*ms"),
+        ("high = 2.0", "high = 1.0", "low must be below high, got 1 and 1"),
+        ('source = "none"', "", "not a file of facts"),
+        ("[[fact]]", "[[fact", "not a file of facts"),
+    ):
+        path = tmp_path / "facts.toml"
+        path.write_text(ENTRY.replace(old, new), encoding="utf-8")
+        with pytest.raises(ValueError, match=message):
+            read_entries(path)
+    path.write_text(ENTRY, encoding="utf-8")
+    assert read_entries(path)[0].quantity == "speed"
