@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.identification.facts import Fact, facts, read_entries
-from mjhill.identification.free_velocity import free_velocity
-from mjhill.identification.impedance import held_impedance, passive_stiffness, stiffness_slope
-from mjhill.identification.rig import (
+from mjhill.experiments.free_velocity import free_velocity
+from mjhill.experiments.impedance import held_impedance, passive_stiffness, stiffness_slope
+from mjhill.experiments.rig import (
     UnmeasuredError,
     angles,
     holding,
@@ -20,8 +19,9 @@ from mjhill.identification.rig import (
     still,
     strongest_angle,
 )
-from mjhill.identification.turn import turn
-from mjhill.identification.twitch import twitch
+from mjhill.experiments.turn import turn
+from mjhill.experiments.twitch import twitch
+from mjhill.identification.facts import Fact, facts, read_entries
 from mjhill.reference import plant_torque
 
 MUSCLE = mjhill.Muscle(

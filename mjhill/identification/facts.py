@@ -14,8 +14,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from mjhill.experiments.rig import UnmeasuredError
 from mjhill.identification.measures import MEASURES
-from mjhill.identification.rig import UnmeasuredError
 from mjhill.joints import JOINTS
 from mjhill.parameters import Joint
 

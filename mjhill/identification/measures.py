@@ -9,10 +9,10 @@ from collections.abc import Callable, Mapping, Sequence
 from math import radians
 from types import MappingProxyType
 
-from mjhill.identification.free_velocity import free_velocity
-from mjhill.identification.impedance import held_impedance, passive_stiffness, stiffness_slope
-from mjhill.identification.turn import Turn, turn
-from mjhill.identification.twitch import twitch
+from mjhill.experiments.free_velocity import free_velocity
+from mjhill.experiments.impedance import held_impedance, passive_stiffness, stiffness_slope
+from mjhill.experiments.turn import Turn, turn
+from mjhill.experiments.twitch import twitch
 from mjhill.parameters import Joint
 
 Measure = Callable[..., float]

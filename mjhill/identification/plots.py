@@ -15,8 +15,8 @@ from mjhill.identification.movement import Prediction
 from mjhill.identification.second_order import step_response
 from mjhill.parameters import Joint
 from mjhill.reference import plant_torque
+from mjhill.rendering.bellies import MUSCLE_COLOURS
 
-_COLOURS = ("#b5392f", "#2f6fb5")  # of the first muscle and the second
 _DPI = 110
 
 
@@ -63,7 +63,7 @@ def _draw_steps(axes: Any, evidence: Evidence) -> None:
     for (name, row), response in zip(
         evidence.steps, evidence.responses([evidence.joint])[0], strict=True
     ):
-        colour = _COLOURS[muscles.index(name) % 2]
+        colour = MUSCLE_COLOURS[muscles.index(name) % 2]
         axes.plot(time, np.degrees(response), color=colour, label=f"{name}, {row.level:g}")
         wanted = degrees(row.magnitude) * step_response(time, *row.time_constants)
         axes.plot(time, wanted, color=colour, linestyle="--", linewidth=1)
@@ -106,7 +106,7 @@ def _draw_prediction(axes: Any, prediction: Prediction) -> None:
     axes.set_xlim(time[0], time[-1])
     inputs = axes.twinx()
     for index, (muscle, values) in enumerate(prediction.measurement.excitation.items()):
-        colour = _COLOURS[index % 2]
+        colour = MUSCLE_COLOURS[index % 2]
         inputs.fill_between(time, values, step="post", color=colour, alpha=0.25, linewidth=0)
         axes.fill_between([], [], color=colour, alpha=0.25, label=muscle)
     inputs.set(ylim=(0, 4), yticks=[0, 1], ylabel="input [-]")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mjhill.comparison.responses import half_life
-from mjhill.identification.rig import UnmeasuredError, rig, run, still, strongest_angle
+from mjhill.experiments.rig import UnmeasuredError, rig, run, still, strongest_angle
 from mjhill.parameters import Joint
 from mjhill.recording import Recording
 from mjhill.signals import pulse

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import lsim
 
 from mjhill.comparison.responses import SecondOrder, second_order_fit
-from mjhill.identification.rig import (
+from mjhill.experiments.rig import (
     Rig,
     UnmeasuredError,
     direction,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from mjhill.comparison.responses import time_to
-from mjhill.identification.rig import (
+from mjhill.experiments.rig import (
     Rig,
     UnmeasuredError,
     angles,

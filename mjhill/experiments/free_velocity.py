@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mjhill.identification.rig import UnmeasuredError, direction, rig, run, still
+from mjhill.experiments.rig import UnmeasuredError, direction, rig, run, still
 from mjhill.parameters import Joint
 
 _TIME = 1.0  # [s]; the slowest joint has crossed its range by then

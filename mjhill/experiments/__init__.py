@@ -1,0 +1,1 @@
+"""Experiments on a joint: what a laboratory does to it, done to its model."""
