@@ -50,7 +50,8 @@ def record(
     ``<joint>.angle``, ``<joint>.velocity`` (``position`` for a slide, ``qpos0``... for others),
     ``<joint>.applied`` where a torque is given, and for each muscle ``u``, ``n``, ``a``,
     ``velocity`` (of the contractile element, shortening positive), ``stretch`` (of the series
-    element) and ``force`` (tension positive). A native MuJoCo muscle has ``u``, ``a``, ``force``.
+    element) and ``force`` (tension positive). A native MuJoCo muscle has ``u``, ``a``, ``force``,
+    any other actuator ``u`` and ``force`` as MuJoCo has them.
 
     Args:
         model: The model.
@@ -148,6 +149,8 @@ def _readers(model: mujoco.MjModel, loads: list[str]) -> list[tuple[str, str, _R
             readers += _muscle_readers(model, actuator)
         elif model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_MUSCLE:
             readers += _native_readers(model, actuator)
+        else:
+            readers += _other_readers(model, actuator)
     return readers
 
 
@@ -207,6 +210,17 @@ def _native_readers(model: mujoco.MjModel, actuator: int) -> list[tuple[str, str
             effort,
             _item("actuator_force", int(model.actuator_outadr[actuator]), -1),
         ),
+    ]
+
+
+def _other_readers(model: mujoco.MjModel, actuator: int) -> list[tuple[str, str, _Reader]]:
+    """The input and force of an actuator of one control and one output that is no muscle."""
+    if model.actuator_ctrlnum[actuator] != 1 or model.actuator_outnum[actuator] != 1:
+        return []
+    name, effort = actuator_names(model)[actuator], "N·m" if turns(model, actuator) else "MuJoCo"
+    return [
+        (f"{name}.u", "MuJoCo", _item("ctrl", int(model.actuator_ctrladr[actuator]))),
+        (f"{name}.force", effort, _item("actuator_force", int(model.actuator_outadr[actuator]))),
     ]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import pi
 
 import mujoco
 import mujoco.rollout
@@ -49,23 +50,98 @@ class Rig:
         return float(self.model.opt.timestep)
 
 
-def rig(joint: Joint, *, clamped: bool = False, exact: bool = False) -> Rig:
+@dataclass(frozen=True)
+class Dynamometer:
+    """A machine that holds the joint to a path: a motor behind a coupling of finite stiffness.
+
+    It is an actuator ``dynamometer`` of the model. Its input is the path's ``drive`` [N·m], its
+    force the torque in the coupling, which is what its gauge reads, the joint's inertial torque
+    included.
+
+    Attributes:
+        stiffness: Of the coupling [N·m/rad].
+        damping: Of the coupling [N·m·s/rad].
+    """
+
+    stiffness: float
+    damping: float
+
+    def drive(self, angle: float, velocity: float = 0.0) -> float:
+        """Input [N·m] that holds the joint to an angle [rad] that moves at a velocity [rad/s]."""
+        return self.stiffness * angle + self.damping * velocity
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A linear spring between the joint and the ground.
+
+    Attributes:
+        stiffness: [N·m/rad].
+        rest: Angle at which it is slack [rad].
+    """
+
+    stiffness: float
+    rest: float
+
+
+def dynamometer(joint: Joint, frequency: float = 40.0) -> Dynamometer:
+    """A dynamometer on whose coupling the joint rings at a frequency [Hz], critically damped."""
+    pulsation = 2 * pi * frequency
+    return Dynamometer(joint.inertia * pulsation**2, 2 * joint.inertia * pulsation)
+
+
+def rig(
+    joint: Joint,
+    *,
+    clamped: bool = False,
+    exact: bool = False,
+    machine: Dynamometer | None = None,
+    spring: Spring | None = None,
+    added_inertia: float = 0.0,
+) -> Rig:
     """A joint on the bench.
 
     Args:
         joint: The joint.
-        clamped: Whether it cannot move, so that its muscles are isometric.
+        clamped: Whether it cannot move at all, so that its muscles are isometric.
         exact: Whether to integrate by RK4; the half step by which Euler's method is early takes
             half a step's worth of stiffness off the damping that a fit finds.
+        machine: A dynamometer on the joint; the joint is then integrated by implicitfast, which
+            is stable with a stiff coupling.
+        spring: A spring on the joint.
+        added_inertia: Of a body fixed to the limb [kg·m²].
     """
     spec = joint_spec(joint)
     spec.option.timestep = _TIMESTEPS.get(joint.name, _TIMESTEP)
+    if machine:
+        _mount(spec, joint.name, machine)
+    if spring:
+        tendon = spec.add_tendon(name="spring", stiffness=[spring.stiffness, 0, 0])
+        tendon.springlength = [spring.rest, spring.rest]
+        tendon.wrap_joint(joint.name, 1.0)
+    if added_inertia > 0:
+        spec.bodies[1].add_body(
+            name="added", mass=1, ipos=[0, 0, 0], inertia=[added_inertia] * 3, explicitinertial=True
+        )
     if exact:
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     if clamped:
         spec.joints[0].armature = _CLAMP
     with without_python_callbacks():
         return Rig(joint, spec.compile())
+
+
+def _mount(spec: mujoco.MjSpec, joint: str, machine: Dynamometer) -> None:
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.add_actuator(
+        name="dynamometer",
+        target=joint,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        gainprm=[1, *[0] * 9],
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+        biasprm=[0, -machine.stiffness, -machine.damping, *[0] * 7],
+    )
 
 
 def still(bench: Rig, angle: float, levels: Mapping[str, float] | None = None) -> mujoco.MjData:
@@ -112,10 +188,11 @@ def angles(
     Bit for bit the same and thirty times as fast, for searches; ``start`` stays as it is.
     """
     steps = round(duration / bench.timestep)
-    control = np.empty((1, steps, bench.model.nu))
-    for index, name in enumerate(bench.joint.muscles):
+    control = np.tile(start.ctrl, (1, steps, 1))
+    for name, signal in excitation.items():
+        index = bench.model.actuator_ctrladr[bench.model.actuator(name).id]
         # held over each step at the value of mid-step, as in a recorded run
-        control[0, :, index] = [excitation[name]((k + 0.5) * bench.timestep) for k in range(steps)]
+        control[0, :, index] = [signal((k + 0.5) * bench.timestep) for k in range(steps)]
     state = np.empty(mujoco.mj_stateSize(bench.model, _STATE))
     mujoco.mj_getState(bench.model, start, state, _STATE)
     with installed():
