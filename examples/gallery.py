@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 import mjhill
 
-LEVEL = 0.4  # input [-]
-DURATION = 0.4  # [s]
+LEVEL = 0.8  # input [-]
+DURATION = 0.2  # [s]
 COLUMNS = 4
 
 
@@ -35,9 +35,9 @@ def main(path: str = "joints.png") -> None:
     for axis, name in zip(axes, mjhill.JOINTS, strict=False):
         image, caption = pose(name)
         axis.imshow(image)
-        axis.set_title(caption, fontsize=11)
+        axis.set_title(caption, fontsize=12)
         print(caption)
-    figure.savefig(path, dpi=100)
+    figure.savefig(path, dpi=80)
 
 
 if __name__ == "__main__":

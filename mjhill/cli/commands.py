@@ -226,7 +226,7 @@ def _film(
 
         with progress_bar("filming") as progress:
             render(
-                View(loaded, recording),
+                View(loaded, recording, Path(model).stem),
                 files["video"],
                 progress=lambda done, total: progress(done / total),
                 **video,

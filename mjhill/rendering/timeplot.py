@@ -18,6 +18,7 @@ Image = NDArray[np.uint8]
 _DPI = 100.0
 _INK = "#2b2b33"
 _SOFT = "#6a6a75"
+_LEAST = 9.0  # height of the letters of a small video's axes [px]
 _FAINT = 0.22  # opacity of what is yet to come
 _GLYPHS = "0123456789.- +tsenaif"
 
@@ -152,16 +153,20 @@ def _draw_axes(
     bottom = 1 - (box.top + box.height) / height
     plane = figure.add_axes((box.left / width, bottom, box.width / width, box.height / height))
     points = 72 / _DPI * panel.unit
+
+    def letters(pixels: float) -> float:
+        return points * max(pixels, min(_LEAST / panel.unit, 18.0))
+
     for curve in plot.curves:
         plane.plot(
             curve.time, curve.values, color=curve.colour, linewidth=2.4 * points, label=curve.label
         )
     style = {"family": "DejaVu Sans", "color": _INK, "parse_math": False}
-    plane.set_title(plot.title, loc="left", fontsize=15 * points, pad=7 * points, **style)
+    plane.set_title(plot.title, loc="left", fontsize=letters(15), pad=7 * points, **style)
     if last:
-        plane.set_xlabel("time [s]", fontsize=14 * points, labelpad=4 * points, **style)
+        plane.set_xlabel("time [s]", fontsize=letters(14), labelpad=4 * points, **style)
     plane.tick_params(
-        labelsize=13 * points, length=4 * points, width=points, colors=_SOFT, labelbottom=last
+        labelsize=letters(13), length=4 * points, width=points, colors=_SOFT, labelbottom=last
     )
     plane.locator_params(axis="y", nbins=4)
     plane.locator_params(axis="x", nbins=6)
@@ -171,7 +176,7 @@ def _draw_axes(
         spine.set_visible(name in ("left", "bottom"))
         spine.set(color=_SOFT, linewidth=points)
     if plot.named:
-        plane.legend(fontsize=12 * points, loc="upper right", frameon=False, ncols=2)
+        plane.legend(fontsize=letters(12), loc="upper right", frameon=False, ncols=2)
     return plane
 
 
