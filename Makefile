@@ -1,12 +1,13 @@
 # make demo, make test: set everything up, then do it. make check: format, lint, types.
 # make models: write the parameters of mjhill/data/joints.toml into models/.
+# make joints: fit that file to the literature first, and write docs/joints.md.
 PYTHON ?= python3
 VENV ?= .venv
 READY := $(VENV)/.ready
 RUN := $(VENV)/bin
 export VENV
 
-.PHONY: demo test check format models setup clean
+.PHONY: demo test check format models joints setup clean
 
 demo: $(READY)
 	@.ci/graphics
@@ -26,6 +27,13 @@ format: $(READY)
 	@$(RUN)/ruff check --fix .
 
 models: $(READY)
+	@$(RUN)/python -m mjhill.mjcf models
+
+joints: $(READY)
+	@mkdir -p out
+	@$(RUN)/mjhill identify --output out/joints > out/joints.txt
+	@cp out/joints/joints.toml mjhill/data/joints.toml
+	@cp out/joints/report.md docs/joints.md
 	@$(RUN)/python -m mjhill.mjcf models
 
 setup: $(READY)

@@ -11,6 +11,7 @@ from mjhill.install import installed as installed
 from mjhill.install import installed_backend as installed_backend
 from mjhill.install import uninstall as uninstall
 from mjhill.joints import JOINTS as JOINTS
+from mjhill.joints import read_joints as read_joints
 from mjhill.layout import muscle_names as muscle_names
 from mjhill.layout import read_muscle as read_muscle
 from mjhill.layout import read_passive as read_passive

@@ -1,6 +1,7 @@
 import re
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import mujoco
@@ -10,6 +11,10 @@ from click.testing import CliRunner
 import mjhill
 from mjhill.bench import accuracy
 from mjhill.cli import main
+from mjhill.identification.facts import facts
+from mjhill.identification.free import free_parameters, value_of
+from mjhill.identification.literature import published_rows
+from mjhill.identification.report import brief
 from mjhill.layout import SLOTS
 
 ROOT = Path(__file__).parent.parent
@@ -43,8 +48,15 @@ def test_every_python_snippet_runs(snippet):
 
 @pytest.mark.parametrize("arguments", COMMANDS, ids=" ".join)
 def test_every_command_runs(arguments):
-    result = CliRunner().invoke(main, arguments)
-    assert result.exit_code == 0, result.output
+    # after those that write what it reads
+    makers = [c for c in COMMANDS[: COMMANDS.index(arguments)] if set(outputs(c)) & set(arguments)]
+    for command in [*makers, arguments]:
+        result = CliRunner().invoke(main, command)
+        assert result.exit_code == 0, result.output
+
+
+def outputs(command):
+    return [value for option, value in pairwise(command) if option == "--output"]
 
 
 def test_there_are_snippets_of_each_kind():
@@ -69,6 +81,34 @@ def test_the_parameter_table_is_the_slot_table():
         for slot, name in zip(slots, re.findall(r"`(\w+)`", names), strict=False):
             found[name] = (array, slot)
     assert found == SLOTS
+
+
+def table_under(marker):
+    (table,) = re.findall(rf"<!-- {marker}.*?-->\n(.*?)<!-- end -->", README, re.DOTALL)
+    return [line.strip("|").split("|") for line in table.splitlines()]
+
+
+def test_the_table_of_joints_is_what_is_measured():
+    head, _, *rows = table_under("joints")
+    held_out = facts()
+    for row, joint in zip(rows, mjhill.JOINTS.values(), strict=True):
+        for title, cell, value in zip(head, row, brief(joint, held_out).values(), strict=True):
+            if isinstance(value, float):  # written with two digits
+                assert float(cell) == pytest.approx(value, rel=0.06), (joint.name, title)
+            else:
+                assert cell.strip() == (value or ""), (joint.name, title)
+
+
+def test_the_page_of_joints_has_the_numbers_of_the_parameter_file():
+    page = (ROOT / "docs" / "joints.md").read_text(encoding="utf-8")
+    for joint in mjhill.JOINTS.values():
+        for free in free_parameters(joint.name):
+            (cell,) = re.findall(rf"^\| {joint.name} \| {free.name} \| (\S+) \|", page, re.M)
+            assert float(cell) == pytest.approx(value_of(joint, free), rel=6e-3)
+        for row in published_rows(joint):
+            pattern = rf"^\| {joint.name} \| {re.escape(row['quantity'])} \| \S+ \| \S+ \| (\S+) \|"
+            (cell,) = re.findall(pattern, page, re.M)
+            assert float(cell) == pytest.approx(row["ours"], rel=6e-3)
 
 
 def test_the_accuracy_table_is_what_the_benchmark_measures():

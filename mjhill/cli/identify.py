@@ -56,20 +56,19 @@ def identify(
         raise ValueError("--predict and --fit go with --data; the literature is fitted whole")
     output.mkdir(parents=True, exist_ok=True)
     names = _known(joints, parameters)
-    files = {"parameters": output / "joints.toml", "numbers": output / "identify.json"}
-    files |= {name: output / f"{name}.png" for name in names}
+    files = {
+        "parameters": output / "joints.toml",
+        "numbers": output / "identify.json",
+        "page": output / "report.md",
+        **{name: output / f"{name}.png" for name in names},
+    }
     for path in files.values():
         check_writable(path)
     if data:
-        report, results = _measured(names[0], data, predict, only, parameters, files)
+        report = _measured(names[0], data, predict, only, parameters, files)
     else:
-        report, results = _published(names, parameters, files)
-
-    from mjhill.identification.writing import write_parameters
-
-    write_parameters(files["parameters"], results, parameters)
-    with replacing(files["numbers"]) as partial:
-        partial.write_text(json.dumps(report, ensure_ascii=False, indent=1), encoding="utf-8")
+        report = _published(names, parameters, files)
+    _write(files["numbers"], json.dumps(report, ensure_ascii=False, indent=1))
     if as_json:
         click.echo(json.dumps(report, ensure_ascii=False))
         return
@@ -87,19 +86,22 @@ def _known(joints: tuple[str, ...], parameters: Path | None) -> list[str]:
     return list(dict.fromkeys(joints)) or list(known)
 
 
-def _published(
-    names: list[str], parameters: Path | None, files: dict[str, Path]
-) -> tuple[dict[str, Any], list[Any]]:
+def _published(names: list[str], parameters: Path | None, files: dict[str, Path]) -> dict[str, Any]:
     from mjhill.identification.facts import facts
     from mjhill.identification.literature import from_literature, published_rows, step_rows
     from mjhill.identification.plots import plot_literature
-    from mjhill.identification.report import estimate_rows, fact_rows
+    from mjhill.identification.report import estimate_rows, fact_rows, markdown
+    from mjhill.identification.writing import write_parameters
+    from mjhill.joints import read_joints
 
     results = []
     for index, name in enumerate(names):
         with progress_bar(f"fitting {name}, {index + 1} of {len(names)}") as progress:
             results.append(from_literature(name, parameters, progress))
-    joints = {result.joint.name: result.joint for result in results}
+    write_parameters(files["parameters"], results, parameters)
+    # what is reported is what the file holds, to its digits
+    written = read_joints(files["parameters"])
+    joints = {name: written[name] for name in names}
     with progress_bar("measuring what the fit did not use") as progress:
         held_out = facts(joints, progress)
     for name, joint in joints.items():
@@ -112,7 +114,8 @@ def _published(
         "Not used by the fit": fact_rows(held_out),
         "Parameters": [row for result in results for row in estimate_rows(result)],
     }
-    return report, results
+    _write(files["page"], markdown(report))
+    return report
 
 
 def _measured(
@@ -122,13 +125,15 @@ def _measured(
     only: tuple[str, ...],
     parameters: Path | None,
     files: dict[str, Path],
-) -> tuple[dict[str, Any], list[Any]]:
+) -> dict[str, Any]:
     from mjhill.identification.measurement import read_measurement
     from mjhill.identification.movement import from_measurements
     from mjhill.identification.plots import plot_predictions
     from mjhill.identification.report import estimate_rows, prediction_rows
+    from mjhill.identification.writing import write_parameters
     from mjhill.joints import read_joints
 
+    del files["page"]
     joint = read_joints(parameters)[name]
     measurements = [read_measurement(path, joint) for path in data]
     with progress_bar(f"fitting {name}") as progress:
@@ -136,12 +141,17 @@ def _measured(
             name, measurements, predict=predict, only=only, parameters=parameters,
             progress=progress,
         )  # fmt: skip
+    write_parameters(files["parameters"], [result], parameters)
     plot_predictions(name, predictions, files[name])
-    report = {
+    return {
         "Measurements": prediction_rows(predictions),
         "Parameters": estimate_rows(result),
     }
-    return report, [result]
+
+
+def _write(path: Path, text: str) -> None:
+    with replacing(path) as partial:
+        partial.write_text(text, encoding="utf-8")
 
 
 def _print(report: dict[str, Any]) -> None:

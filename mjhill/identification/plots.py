@@ -53,7 +53,7 @@ def plot_predictions(joint: str, predictions: Sequence[Prediction], path: str | 
 def _figure(count: int) -> tuple[Any, list[Any]]:
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(5.2 * count, 4.2), dpi=_DPI, layout="constrained")
+    figure = Figure(figsize=(max(5.2 * count, 8.0), 4.2), dpi=_DPI, layout="constrained")
     return figure, list(figure.subplots(1, count, squeeze=False)[0])
 
 
