@@ -18,7 +18,7 @@ from mjhill.layout import (
     turns,
 )
 from mjhill.models import load
-from mjhill.parameters import quantities
+from mjhill.parameters import Joint, quantities
 
 
 def rows(model: str | Path) -> list[dict[str, Any]]:
@@ -35,6 +35,7 @@ def rows(model: str | Path) -> list[dict[str, Any]]:
         parts: list[tuple[str, Any, bool]] = [(joint.name, joint, True)]
         parts.append((joint.name, joint.passive, True))
         parts += [(name, muscle, True) for name, muscle in joint.muscles.items()]
+        return [row for part in parts for row in _part_rows(*part)] + list(_angle_rows(joint))
     else:
         loaded = load(model)
         parts = [
@@ -44,6 +45,28 @@ def rows(model: str | Path) -> list[dict[str, Any]]:
             hinge = turns(loaded, at.actuator)
             parts.append((name, read_muscle(loaded, name), hinge))
     return [row for part in parts for row in _part_rows(*part)]
+
+
+def _angle_rows(joint: Joint) -> Iterator[dict[str, Any]]:
+    """The angles of a joint that are no parameters of its model."""
+    low, high = joint.range
+    angles = [
+        ("range", low, "least angle of the range of motion, which is no stop"),
+        ("range", high, "largest angle of the range of motion"),
+        ("home_angle", joint.home_angle, "angle of the home pose"),
+    ]
+    for muscle, angle in joint.postures.items():
+        angles.append((f"postures.{muscle}", angle, "where a step of the muscle starts, at rest"))
+    for name, value, meaning in angles:
+        yield {
+            "of": joint.name,
+            "parameter": name,
+            "symbol": "",
+            "value": value,
+            "unit": "rad",
+            "meaning": meaning,
+            "source": joint.sources.get(name, ""),
+        }
 
 
 def elastic_joints(model: mujoco.MjModel) -> Iterator[tuple[str, bool]]:

@@ -67,7 +67,8 @@ def _joint(name: str, table: Mapping[str, Any]) -> Joint:
         gears[muscle] = parts.pop("gear")
         muscles[muscle] = Muscle(**parts)
     postures = _split(values.pop("postures", {}))
-    del postures["sources"]
+    told = {f"postures.{muscle}": source for muscle, source in postures.pop("sources").items()}
+    values["sources"] = MappingProxyType({**values["sources"], **told})
     return Joint(
         name=name,
         passive=Passive(**_split(values.pop("passive"))),
