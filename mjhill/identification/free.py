@@ -72,7 +72,8 @@ def free_parameters(joint: str, path: str | Path | None = None) -> list[Free]:
 
     Raises:
         ValueError: The file is not in order, there is no such joint, bounds are not two ascending
-            numbers that the value lies between, or those of what cannot be fitted.
+            numbers that the value lies between or those of what cannot be fitted, or there are
+            none.
     """
     known = read_joints(path)
     if joint not in known:
@@ -87,6 +88,8 @@ def free_parameters(joint: str, path: str | Path | None = None) -> list[Free]:
                 f"{joint}: {free.name} must have ascending bounds about its value {value:g}, "
                 f"got [{free.low:g}, {free.high:g}]"
             )
+    if not found:
+        raise ValueError(f"{joint}: no parameter has bounds, so there is none to fit; add some")
     return [free for free, _ in found]
 
 

@@ -18,6 +18,7 @@ from mjhill.joints import read_joints
 from mjhill.parameters import Joint
 
 PREDICTIONS = ("angle", "torque")
+_OTHER = {"angle": "torque", "torque": "angle"}
 _HELD = 0.02  # [rad], a joint that moves less is taken as held still
 _SMOOTHING = 10.0  # [Hz], cut-off of the path of a driven joint, usual for human movement
 _LONGEST_STEP = 1e-3  # [s]
@@ -83,8 +84,8 @@ def from_measurements(
         progress: Called with the share done, 0 to 1.
 
     Raises:
-        ValueError: The joint or a parameter is unknown, there is no measurement, or ``predict``
-            is neither.
+        ValueError: The joint or a parameter is unknown, there is no measurement, ``predict``
+            is neither, or what is to be predicted never changes.
         RuntimeError: The fit did not settle.
     """
     if not measurements:
@@ -164,7 +165,12 @@ class _Trial:
         self.measurement = measurement
         self.quantity = predict or ("torque" if held else "angle")
         self.measured = getattr(measurement, self.quantity)
-        self.spread = max(float(np.ptp(self.measured)), 1e-9)
+        self.spread = float(np.ptp(self.measured))
+        if self.spread == 0:
+            raise ValueError(
+                f"{measurement.source}: the {self.quantity} never changes, so there is nothing to "
+                f"predict; predict the {_OTHER[self.quantity]} instead"
+            )
         self._time = measurement.time - measurement.time[0]
         interval = float(np.median(np.diff(self._time)))
         self._timestep = min(_LONGEST_STEP, interval)
@@ -174,7 +180,8 @@ class _Trial:
         self._before, self._excitation = excitation[0], excitation[latest]
         self._torque = measurement.torque[latest]
         self._path = self._smooth_path(interval) if self.quantity == "torque" else None
-        first = self._time <= max(_START_SPAN, 5 * interval)
+        # six samples or more, though the first come late where times are uneven
+        first = self._time <= max(_START_SPAN, self._time[:6].max())
         line = linregress(self._time[first], measurement.angle[first])
         self._velocity, self._velocity_spread = float(line.slope), float(line.stderr) + 1e-6
 
