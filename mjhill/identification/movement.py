@@ -25,7 +25,8 @@ _LONGEST_STEP = 1e-3  # [s]
 _FIRST_NOISE = 0.02  # of the spread of what is predicted, until the fit says better
 _LEAST_NOISE = 1e-4  # of that spread: no simulation is nearer to a joint
 _ROUNDS = 4
-_START_SPAN = 0.05  # [s] from whose samples the starting velocity is guessed
+_START_SPAN = 0.05  # [s] from whose samples the start is guessed
+_LEAST_SPREAD = 1e-6  # [rad] and [rad/s]
 
 _Values = NDArray[np.float64]
 
@@ -68,9 +69,10 @@ def from_measurements(
 ) -> tuple[Identified, list[Prediction]]:
     """Fit the free parameters of a joint to measurements of one subject.
 
-    Each measurement starts with muscles steady at its first inputs. Its inputs hold from sample
-    to sample. The priors are those of ``mjhill.identification.free``: a parameter that the data
-    say nothing about stays in the middle of its bounds, and ``Estimate.informed`` tells.
+    Each measurement starts with muscles steady at its first inputs, at an angle and a velocity
+    that are fitted besides. Its inputs hold from sample to sample. The priors are those of
+    ``mjhill.identification.free``: a parameter that the data say nothing about stays in the
+    middle of its bounds, and ``Estimate.informed`` tells.
 
     Args:
         joint: The joint's name.
@@ -99,7 +101,7 @@ def from_measurements(
     fitted = joint_at(start, free, solution.deviations[: len(free)])
     predictions = []
     for trial, offset in zip(trials, _offsets(solution.deviations, len(free)), strict=True):
-        predicted = trial.predict([fitted], offset[None])[0]
+        predicted = trial.predict([fitted], offset)[0]
         predictions.append(Prediction(trial.measurement, trial.quantity, trial.measured, predicted))
     return Identified(fitted, tuple(free), tuple(solution.estimates(free))), predictions
 
@@ -122,14 +124,16 @@ def _solve(
     progress: Callable[[float], None] | None,
 ) -> Solution:
     """Fit, take the noise from what is left, and fit again until it no longer changes."""
-    count = len(free) + len(trials)  # a starting velocity for each trial besides
+    count = len(free) + 2 * len(trials)  # where each trial starts, and how fast, besides
     weights = [1.0 / (_FIRST_NOISE * trial.spread) for trial in trials]
 
     def residuals(points: _Values) -> _Values:
         joints = [joint_at(start, free, point[: len(free)]) for point in points.T]
         parts = [
-            weight * (trial.predict(joints, points[len(free) + k]) - trial.measured)
-            for k, (trial, weight) in enumerate(zip(trials, weights, strict=True))
+            weight * (trial.predict(joints, offset) - trial.measured)
+            for trial, weight, offset in zip(
+                trials, weights, _offsets(points, len(free)), strict=True
+            )
         ]
         return np.ascontiguousarray(np.concatenate(parts, axis=1).T)
 
@@ -142,7 +146,7 @@ def _solve(
         joint = joint_at(start, free, point[: len(free)])
         before = weights
         weights = [
-            trial.weight(trial.predict([joint], offset[None])[0])
+            trial.weight(trial.predict([joint], offset)[0])
             for trial, offset in zip(trials, _offsets(point, len(free)), strict=True)
         ]
         if np.allclose(weights, before, rtol=0.02):
@@ -150,17 +154,15 @@ def _solve(
     return solution
 
 
-def _offsets(deviations: _Values, free: int) -> _Values:
-    """The starting velocity of each trial, in deviations, shape (trials, 1)."""
-    return deviations[free:, None]
+def _offsets(points: _Values, free: int) -> _Values:
+    """Start of each trial, in deviations: angle and velocity at K points, (trials, 2, K)."""
+    return points[free:].reshape(-1, 2, points[0].size)
 
 
 class _Trial:
     """A measurement made ready: its inputs on a grid of steps, what is to be predicted."""
 
     def __init__(self, joint: Joint, measurement: Measurement, predict: str | None) -> None:
-        from scipy.stats import linregress
-
         held = np.ptp(measurement.angle) < _HELD
         self.measurement = measurement
         self.quantity = predict or ("torque" if held else "angle")
@@ -182,11 +184,10 @@ class _Trial:
         self._path = self._smooth_path(interval) if self.quantity == "torque" else None
         # six samples or more, though the first come late where times are uneven
         first = self._time <= max(_START_SPAN, self._time[:6].max())
-        line = linregress(self._time[first], measurement.angle[first])
-        self._velocity, self._velocity_spread = float(line.slope), float(line.stderr) + 1e-6
+        self._start, self._start_spread = _start(self._time[first], measurement.angle[first])
 
     def predict(self, joints: Sequence[Joint], offsets: _Values) -> _Values:
-        """What joints do, shape (joints, T), with deviations of their starting velocities."""
+        """What joints do, shape (joints, T), with deviations of their starts, (2, joints)."""
         if self._path is not None:
             run = driving_torques(
                 joints,
@@ -196,10 +197,11 @@ class _Trial:
                 timestep=self._timestep,
             )
         else:
+            start, velocity = self._start[:, None] + self._start_spread[:, None] * offsets
             run = angles(
                 joints,
-                start=self.measurement.angle[0],
-                velocity=self._velocity + self._velocity_spread * np.asarray(offsets),
+                start=start,
+                velocity=velocity,
                 before=self._before,
                 excitation=self._excitation[:-1],
                 torque=self._torque[:-1],
@@ -228,3 +230,15 @@ class _Trial:
             return np.full_like(path, float(np.mean(path)))
         sections = butter(2, min(_SMOOTHING, 0.4 / interval), fs=1 / self._timestep, output="sos")
         return np.asarray(sosfiltfilt(sections, path))
+
+
+def _start(time: _Values, angle: _Values) -> tuple[_Values, _Values]:
+    """Angle [rad] and velocity [rad/s] at time 0, and their spreads, from the first samples.
+
+    By a parabola, as the joint may already be speeding up. Its distance to a straight line is
+    doubted too: noise is not all that it can miss, and the bounds of a fit are hard.
+    """
+    parabola, covariance = np.polyfit(time, angle, 2, cov=True)
+    line = np.polyfit(time, angle, 1)
+    spread = np.abs(parabola[1:] - line) + 2 * np.sqrt(np.diag(covariance)[1:])
+    return parabola[:0:-1], spread[::-1] + _LEAST_SPREAD
