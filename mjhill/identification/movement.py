@@ -176,7 +176,8 @@ class _Trial:
         self._time = measurement.time - measurement.time[0]
         interval = float(np.median(np.diff(self._time)))
         self._timestep = min(_LONGEST_STEP, interval)
-        self._grid = np.arange(int(np.ceil(self._time[-1] / self._timestep)) + 1) * self._timestep
+        steps = int(np.ceil(self._time[-1] / self._timestep - 1e-6))  # free of rounding
+        self._grid = np.arange(steps + 1) * self._timestep
         latest = np.searchsorted(self._time, self._grid + 1e-9, side="right") - 1
         excitation = np.stack([measurement.excitation[name] for name in joint.muscles], axis=1)
         self._before, self._excitation = excitation[0], excitation[latest]
@@ -228,8 +229,11 @@ class _Trial:
         path = np.interp(self._grid, self._time, self.measurement.angle)
         if np.ptp(path) < _HELD:
             return np.full_like(path, float(np.mean(path)))
-        sections = butter(2, min(_SMOOTHING, 0.4 / interval), fs=1 / self._timestep, output="sos")
-        return np.asarray(sosfiltfilt(sections, path))
+        cutoff = min(_SMOOTHING, 0.4 / interval)
+        sections = butter(2, cutoff, fs=1 / self._timestep, output="sos")
+        # ends go on for a period and a half of the cut-off, else the last torques are far off
+        beyond = min(round(1.5 / (cutoff * self._timestep)), len(path) - 1)
+        return np.asarray(sosfiltfilt(sections, path, padlen=beyond))
 
 
 def _start(time: _Values, angle: _Values) -> tuple[_Values, _Values]:
