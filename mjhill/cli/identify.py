@@ -54,8 +54,8 @@ def identify(
         raise ValueError(f"name the one joint that was measured, got {len(joints)}")
     if not data and (predict or only):
         raise ValueError("--predict and --fit go with --data; the literature is fitted whole")
-    output.mkdir(parents=True, exist_ok=True)
     names = _known(joints, parameters)
+    output.mkdir(parents=True, exist_ok=True)
     files = {
         "parameters": output / "joints.toml",
         "numbers": output / "identify.json",

@@ -36,7 +36,7 @@ def angles(
     Through MuJoCo and the compiled callbacks, one simulation a joint.
 
     Args:
-        joints: N joints that differ in numbers only: the same muscles, gears and inertia.
+        joints: N joints that differ in numbers only: the same muscles and gears.
         start: Angle at time 0 [rad], broadcast to (N,).
         velocity: Velocity at time 0 [rad/s], broadcast to (N,).
         before: Input at which the muscles are steady at time 0, broadcast to (N, muscles).
@@ -44,15 +44,19 @@ def angles(
         torque: External torque over each step [N·m], broadcast to (N, steps).
         steps: Number of steps.
         timestep: Length of a step [s].
+
+    Raises:
+        RuntimeError: MuJoCo warned, and so did not simulate to the end.
     """
     muscles = len(joints[0].muscles)
-    batch = _batch(joint_spec(joints[0]), joints, start, velocity, before, timestep)
     inputs = np.empty((len(joints), steps, muscles + 1))
     inputs[:, :, :muscles], inputs[:, :, muscles] = excitation, torque
     result = np.empty((len(joints), steps + 1))
     result[:, 0] = start
-    with installed():
+    with installed():  # from the start: no batch runs under Python callbacks
+        batch = _batch(joints, start, velocity, before, timestep)
         result[:, 1:] = batch.rollout(steps, inputs, _INPUTS)["qpos"][:, :, 0]
+    _check_warnings(batch, joints[0].name)
     return result
 
 
@@ -75,14 +79,18 @@ def driving_torques(
         before: As in ``angles``.
         excitation: Input of each muscle over each step, shape (T, muscles).
         timestep: Length of a step [s].
+
+    Raises:
+        RuntimeError: MuJoCo warned, and so did not simulate to the end.
     """
-    batch = _batch(joint_spec(joints[0]), joints, path[0], 0.0, before, timestep)
-    passive, muscles = batch.bind("qfrc_passive"), batch.bind("qfrc_actuator")
     speed = np.diff(path, prepend=path[0]) / timestep  # the way the muscles have really come
-    inertial = joints[0].inertia * np.gradient(np.gradient(path, timestep), timestep)
+    acceleration = np.gradient(np.gradient(path, timestep), timestep)
+    inertial = np.outer([joint.inertia for joint in joints], acceleration)
     result = np.empty((len(joints), len(path)))
     inputs = np.asarray(excitation)
     with installed():
+        batch = _batch(joints, path[0], 0.0, before, timestep)
+        passive, muscles = batch.bind("qfrc_passive"), batch.bind("qfrc_actuator")
         for step in range(len(path)):
             batch.qpos[:, 0], batch.qvel[:, 0], batch.ctrl[:] = (
                 path[step],
@@ -90,12 +98,12 @@ def driving_torques(
                 inputs[step],
             )
             batch.step()
-            result[:, step] = inertial[step] - passive[:, 0] - muscles[:, 0]
+            result[:, step] = inertial[:, step] - passive[:, 0] - muscles[:, 0]
+    _check_warnings(batch, joints[0].name)
     return result
 
 
 def _batch(
-    spec: mujoco.MjSpec,
     joints: Sequence[Joint],
     start: ArrayLike,
     velocity: ArrayLike,
@@ -103,6 +111,7 @@ def _batch(
     timestep: float,
 ) -> mujoco.batch.Batch:
     """A simulation for each joint, its muscles steady at the start."""
+    spec = joint_spec(joints[0])
     spec.option.timestep = timestep
     with without_python_callbacks():
         model = spec.compile()
@@ -115,17 +124,30 @@ def _batch(
 
 
 def _expand(batch: mujoco.batch.Batch, joints: Sequence[Joint]) -> None:
-    """Give each simulation the parameters of its joint; the inertia is the model's."""
+    """Give each simulation the parameters of its joint."""
     rows = {name: batch.expand(f"actuator_{name}") for name in ("dynprm", "gainprm", "biasprm")}
     user, stiffness = batch.expand("jnt_user"), batch.expand("jnt_stiffness")
     rest, damping = batch.expand("qpos_spring"), batch.expand("dof_damping")
+    inertia = batch.expand("body_inertia")
     for i, joint in enumerate(joints):
         for k, muscle in enumerate(joint.muscles.values()):
             for name, row in parameter_rows(muscle).items():
                 rows[name][i, k] = row
         user[i, 0, :NUSER_JNT] = passive_row(joint.passive)
         stiffness[i, 0], rest[i, 0] = joint.stiffness, joint.rest_angle
-        damping[i, 0] = joint.damping
+        damping[i, 0], inertia[i, 1] = joint.damping, joint.inertia
+    batch.set_const()  # the mass matrix, which follows from the inertia
+
+
+def _check_warnings(batch: mujoco.batch.Batch, joint: str) -> None:
+    """Refuse simulations in which MuJoCo warned: they stop, or go on from a state put back."""
+    warned = batch.warning[:, :, 1] > 0  # counts by simulation and kind
+    if warned.any():
+        kind = mujoco.mjtWarning(int(np.argmax(warned.any(axis=0)))).name
+        raise RuntimeError(
+            f"{joint}: MuJoCo warned '{kind.removeprefix('mjWARN_').lower()}' in "
+            f"{warned.any(axis=1).sum()} of {len(warned)} simulations; look for a bad input"
+        )
 
 
 def _steady(joints: Sequence[Joint], start: _Values, inputs: _Values) -> _Values:

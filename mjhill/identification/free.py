@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.joints import parameter_file
+from mjhill.joints import parameter_file, read_joints
 from mjhill.parameters import Joint
 
 DEVIATIONS = 2.0  # from the middle of the bounds to either
+_NOT_FITTED = ("gear", "range", "home_angle")  # conventions, of which no data tell
 
 
 @dataclass(frozen=True)
@@ -70,19 +71,25 @@ def free_parameters(joint: str, path: str | Path | None = None) -> list[Free]:
         path: The parameter file; by default the one that comes with mjhill.
 
     Raises:
-        ValueError: There is no such joint, or bounds are not two ascending numbers that the
-            value lies between.
+        ValueError: The file is not in order, there is no such joint, bounds are not two ascending
+            numbers that the value lies between or those of what cannot be fitted, or there are
+            none.
     """
+    known = read_joints(path)
+    if joint not in known:
+        raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(known)}")
     tables = tomllib.loads(Path(path or parameter_file()).read_text(encoding="utf-8"))
-    if joint not in tables:
-        raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(tables)}")
     found = list(_entries(tables[joint], ()))
     for free, value in found:
+        if free.path[-1] in _NOT_FITTED:
+            raise ValueError(f"{joint}: {free.name} cannot be fitted; remove its bounds")
         if not free.low < free.high or not free.low <= value <= free.high:
             raise ValueError(
                 f"{joint}: {free.name} must have ascending bounds about its value {value:g}, "
                 f"got [{free.low:g}, {free.high:g}]"
             )
+    if not found:
+        raise ValueError(f"{joint}: no parameter has bounds, so there is none to fit; add some")
     return [free for free, _ in found]
 
 
@@ -92,7 +99,7 @@ def _entries(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[tuple[
             continue
         if "bounds" in entry:
             low, high = entry["bounds"]
-            yield Free((*path, name), float(low), float(high)), float(entry["value"])
+            yield Free((*path, name), float(low), float(high)), entry["value"]
         elif "value" not in entry:
             yield from _entries(entry, (*path, name))
 

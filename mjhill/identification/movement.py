@@ -18,13 +18,15 @@ from mjhill.joints import read_joints
 from mjhill.parameters import Joint
 
 PREDICTIONS = ("angle", "torque")
+_OTHER = {"angle": "torque", "torque": "angle"}
 _HELD = 0.02  # [rad], a joint that moves less is taken as held still
 _SMOOTHING = 10.0  # [Hz], cut-off of the path of a driven joint, usual for human movement
 _LONGEST_STEP = 1e-3  # [s]
 _FIRST_NOISE = 0.02  # of the spread of what is predicted, until the fit says better
 _LEAST_NOISE = 1e-4  # of that spread: no simulation is nearer to a joint
 _ROUNDS = 4
-_START_SPAN = 0.05  # [s] from whose samples the starting velocity is guessed
+_START_SPAN = 0.05  # [s] from whose samples the start is guessed
+_LEAST_SPREAD = 1e-6  # [rad] and [rad/s]
 
 _Values = NDArray[np.float64]
 
@@ -67,9 +69,10 @@ def from_measurements(
 ) -> tuple[Identified, list[Prediction]]:
     """Fit the free parameters of a joint to measurements of one subject.
 
-    Each measurement starts with muscles steady at its first inputs. Its inputs hold from sample
-    to sample. The priors are those of ``mjhill.identification.free``: a parameter that the data
-    say nothing about stays in the middle of its bounds, and ``Estimate.informed`` tells.
+    Each measurement starts with muscles steady at its first inputs, at an angle and a velocity
+    that are fitted besides. Its inputs hold from sample to sample. The priors are those of
+    ``mjhill.identification.free``: a parameter that the data say nothing about stays in the
+    middle of its bounds, and ``Estimate.informed`` tells.
 
     Args:
         joint: The joint's name.
@@ -83,8 +86,8 @@ def from_measurements(
         progress: Called with the share done, 0 to 1.
 
     Raises:
-        ValueError: The joint or a parameter is unknown, there is no measurement, or ``predict``
-            is neither.
+        ValueError: The joint or a parameter is unknown, there is no measurement, ``predict``
+            is neither, or what is to be predicted never changes.
         RuntimeError: The fit did not settle.
     """
     if not measurements:
@@ -98,7 +101,7 @@ def from_measurements(
     fitted = joint_at(start, free, solution.deviations[: len(free)])
     predictions = []
     for trial, offset in zip(trials, _offsets(solution.deviations, len(free)), strict=True):
-        predicted = trial.predict([fitted], offset[None])[0]
+        predicted = trial.predict([fitted], offset)[0]
         predictions.append(Prediction(trial.measurement, trial.quantity, trial.measured, predicted))
     return Identified(fitted, tuple(free), tuple(solution.estimates(free))), predictions
 
@@ -121,14 +124,16 @@ def _solve(
     progress: Callable[[float], None] | None,
 ) -> Solution:
     """Fit, take the noise from what is left, and fit again until it no longer changes."""
-    count = len(free) + len(trials)  # a starting velocity for each trial besides
+    count = len(free) + 2 * len(trials)  # where each trial starts, and how fast, besides
     weights = [1.0 / (_FIRST_NOISE * trial.spread) for trial in trials]
 
     def residuals(points: _Values) -> _Values:
         joints = [joint_at(start, free, point[: len(free)]) for point in points.T]
         parts = [
-            weight * (trial.predict(joints, points[len(free) + k]) - trial.measured)
-            for k, (trial, weight) in enumerate(zip(trials, weights, strict=True))
+            weight * (trial.predict(joints, offset) - trial.measured)
+            for trial, weight, offset in zip(
+                trials, weights, _offsets(points, len(free)), strict=True
+            )
         ]
         return np.ascontiguousarray(np.concatenate(parts, axis=1).T)
 
@@ -141,7 +146,7 @@ def _solve(
         joint = joint_at(start, free, point[: len(free)])
         before = weights
         weights = [
-            trial.weight(trial.predict([joint], offset[None])[0])
+            trial.weight(trial.predict([joint], offset)[0])
             for trial, offset in zip(trials, _offsets(point, len(free)), strict=True)
         ]
         if np.allclose(weights, before, rtol=0.02):
@@ -149,37 +154,41 @@ def _solve(
     return solution
 
 
-def _offsets(deviations: _Values, free: int) -> _Values:
-    """The starting velocity of each trial, in deviations, shape (trials, 1)."""
-    return deviations[free:, None]
+def _offsets(points: _Values, free: int) -> _Values:
+    """Start of each trial, in deviations: angle and velocity at K points, (trials, 2, K)."""
+    return points[free:].reshape(-1, 2, points[0].size)
 
 
 class _Trial:
     """A measurement made ready: its inputs on a grid of steps, what is to be predicted."""
 
     def __init__(self, joint: Joint, measurement: Measurement, predict: str | None) -> None:
-        from scipy.stats import linregress
-
         held = np.ptp(measurement.angle) < _HELD
         self.measurement = measurement
         self.quantity = predict or ("torque" if held else "angle")
         self.measured = getattr(measurement, self.quantity)
-        self.spread = max(float(np.ptp(self.measured)), 1e-9)
+        self.spread = float(np.ptp(self.measured))
+        if self.spread == 0:
+            raise ValueError(
+                f"{measurement.source}: the {self.quantity} never changes, so there is nothing to "
+                f"predict; predict the {_OTHER[self.quantity]} instead"
+            )
         self._time = measurement.time - measurement.time[0]
         interval = float(np.median(np.diff(self._time)))
         self._timestep = min(_LONGEST_STEP, interval)
-        self._grid = np.arange(int(np.ceil(self._time[-1] / self._timestep)) + 1) * self._timestep
+        steps = int(np.ceil(self._time[-1] / self._timestep - 1e-6))  # free of rounding
+        self._grid = np.arange(steps + 1) * self._timestep
         latest = np.searchsorted(self._time, self._grid + 1e-9, side="right") - 1
         excitation = np.stack([measurement.excitation[name] for name in joint.muscles], axis=1)
         self._before, self._excitation = excitation[0], excitation[latest]
         self._torque = measurement.torque[latest]
         self._path = self._smooth_path(interval) if self.quantity == "torque" else None
-        first = self._time <= max(_START_SPAN, 5 * interval)
-        line = linregress(self._time[first], measurement.angle[first])
-        self._velocity, self._velocity_spread = float(line.slope), float(line.stderr) + 1e-6
+        # six samples or more, though the first come late where times are uneven
+        first = self._time <= max(_START_SPAN, self._time[:6].max())
+        self._start, self._start_spread = _start(self._time[first], measurement.angle[first])
 
     def predict(self, joints: Sequence[Joint], offsets: _Values) -> _Values:
-        """What joints do, shape (joints, T), with deviations of their starting velocities."""
+        """What joints do, shape (joints, T), with deviations of their starts, (2, joints)."""
         if self._path is not None:
             run = driving_torques(
                 joints,
@@ -189,10 +198,11 @@ class _Trial:
                 timestep=self._timestep,
             )
         else:
+            start, velocity = self._start[:, None] + self._start_spread[:, None] * offsets
             run = angles(
                 joints,
-                start=self.measurement.angle[0],
-                velocity=self._velocity + self._velocity_spread * np.asarray(offsets),
+                start=start,
+                velocity=velocity,
                 before=self._before,
                 excitation=self._excitation[:-1],
                 torque=self._torque[:-1],
@@ -219,5 +229,20 @@ class _Trial:
         path = np.interp(self._grid, self._time, self.measurement.angle)
         if np.ptp(path) < _HELD:
             return np.full_like(path, float(np.mean(path)))
-        sections = butter(2, min(_SMOOTHING, 0.4 / interval), fs=1 / self._timestep, output="sos")
-        return np.asarray(sosfiltfilt(sections, path))
+        cutoff = min(_SMOOTHING, 0.4 / interval)
+        sections = butter(2, cutoff, fs=1 / self._timestep, output="sos")
+        # ends go on for a period and a half of the cut-off, else the last torques are far off
+        beyond = min(round(1.5 / (cutoff * self._timestep)), len(path) - 1)
+        return np.asarray(sosfiltfilt(sections, path, padlen=beyond))
+
+
+def _start(time: _Values, angle: _Values) -> tuple[_Values, _Values]:
+    """Angle [rad] and velocity [rad/s] at time 0, and their spreads, from the first samples.
+
+    By a parabola, as the joint may already be speeding up. Its distance to a straight line is
+    doubted too: noise is not all that it can miss, and the bounds of a fit are hard.
+    """
+    parabola, covariance = np.polyfit(time, angle, 2, cov=True)
+    line = np.polyfit(time, angle, 1)
+    spread = np.abs(parabola[1:] - line) + 2 * np.sqrt(np.diag(covariance)[1:])
+    return parabola[:0:-1], spread[::-1] + _LEAST_SPREAD

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from dataclasses import dataclass
-from math import log, pi, radians
+from math import degrees, log, pi, radians
 from pathlib import Path
 
 from mjhill.parameters import Joint
@@ -40,9 +40,19 @@ class PassiveTorque:
         return -torque if self.angle > joint.rest_angle else torque
 
     def deviation(self, joint: Joint) -> float:
-        """Standard deviations between a joint and the literature, on a logarithmic scale."""
+        """Standard deviations between a joint and the literature, on a logarithmic scale.
+
+        Raises:
+            ValueError: The joint has no passive torque there.
+        """
+        measured = self.measured(joint)
+        if measured <= 0:
+            raise ValueError(
+                f"{joint.name}: no passive torque at {degrees(self.angle):.0f}°, where one is "
+                "published; give it stiffness, and rest elsewhere"
+            )
         middle = 0.5 * (log(self.low) + log(self.high))
-        return (log(self.measured(joint)) - middle) * _SPREAD / log(self.high / self.low)
+        return (log(measured) - middle) * _SPREAD / log(self.high / self.low)
 
 
 @dataclass(frozen=True)

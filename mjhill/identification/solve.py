@@ -66,7 +66,7 @@ class Solution:
         """The parameters with their confidence."""
         spreads = np.sqrt(np.diag(self.covariance)).tolist()
         known = zip(self.deviations.tolist(), spreads, strict=True)
-        # what was fitted besides, such as starting velocities, comes after the parameters
+        # what was fitted besides, such as where a trial starts, comes after the parameters
         return [_estimate(item, z, spread) for item, (z, spread) in zip(free, known, strict=False)]
 
 

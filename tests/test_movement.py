@@ -1,0 +1,230 @@
+"""A synthetic elbow is measured with noise, and found again."""
+
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+import mjhill
+from mjhill.experiments.rig import rig, run, still
+from mjhill.identification.free import value_of
+from mjhill.identification.measurement import Measurement, read_measurement
+from mjhill.identification.movement import from_measurements
+from mjhill.reference import plant_torque
+
+NOISE = 0.003  # [rad], that of optical motion capture
+TORQUE_NOISE = 0.3  # [N·m]
+ONLY = (
+    "damping",
+    "elbow_flexor.max_isometric_force",
+    "elbow_flexor.max_velocity",
+    "elbow_extensor.excitation_tau",  # the extensor is at rest: nothing tells
+)
+INFORMED = ONLY[:3]
+
+
+@pytest.fixture
+def subject(elbow):
+    """The elbow of someone else."""
+    flexor = replace(elbow.muscles["elbow_flexor"], max_isometric_force=64.0, max_velocity=22.0)
+    muscles = MappingProxyType({**elbow.muscles, "elbow_flexor": flexor})
+    return replace(elbow, damping=0.2, muscles=muscles)
+
+
+def moved(subject, duration=0.8, excitation=None, torque=None):
+    """A recorded movement: a pulse of the flexor and a push, by default."""
+    bench = rig(subject)
+    return run(
+        bench,
+        still(bench, subject.home_angle),
+        duration,
+        excitation=excitation or {"elbow_flexor": mjhill.pulse(0.6, 0.1, 0.3)},
+        torque=torque or mjhill.pulse(3.0, 0.6, 0.1),
+    )
+
+
+def noisy(recording, seed=0, noise=NOISE):
+    random = np.random.default_rng(seed)
+    name = "elbow.angle"
+    angle = recording[name] + noise * random.standard_normal(len(recording))
+    return replace(recording, series={**recording.series, name: angle})
+
+
+def measured(recording, pick=slice(None)):
+    """A recording as a measurement, or some of its samples."""
+    return Measurement(
+        "movement",
+        recording.time[pick],
+        {name: recording[f"{name}.u"][pick] for name in ("elbow_flexor", "elbow_extensor")},
+        recording["elbow.angle"][pick],
+        recording["elbow.applied"][pick],
+    )
+
+
+def held(subject, noise=TORQUE_NOISE):
+    """The elbow held still by a clamp whose torque is measured."""
+    bench = rig(subject, clamped=True)
+    pulse = mjhill.pulse(0.6, 0.1, 0.3)
+    recording = run(bench, still(bench, 1.3), 0.5, excitation={"elbow_flexor": pulse})
+    muscles = recording["elbow_extensor.force"] - recording["elbow_flexor.force"]
+    random = np.random.default_rng(1)
+    torque = muscles - plant_torque(subject, 1.3) + noise * random.standard_normal(len(recording))
+    return replace(measured(recording), source="clamp", torque=torque)
+
+
+def check(result, subject, names):
+    """Whether the true values lie in the intervals of 99 %."""
+    by_name = {estimate.name: estimate for estimate in result.estimates}
+    for free in result.free:
+        if free.name in names:
+            estimate = by_name[free.name]
+            spread = (estimate.high - estimate.low) / (2 * 1.96)
+            off = abs(estimate.value - value_of(subject, free))
+            assert off < 2.6 * spread, free.name
+            assert estimate.informed > 0.9, free.name
+
+
+def test_a_recording_saved_and_read_gives_the_joint_again(subject, tmp_path):
+    path = noisy(moved(subject)).save(tmp_path / "elbow.csv")
+    shares = []
+    result, (prediction,) = from_measurements(
+        "elbow", [read_measurement(path, subject)], only=ONLY, progress=shares.append
+    )
+    assert prediction.quantity == "angle"
+    assert prediction.error == pytest.approx(NOISE, rel=0.1)  # 801 samples: 2.5 %, four times
+    assert prediction.explained > 0.999
+    check(result, subject, INFORMED)
+    assert shares == sorted(shares)
+    assert 0 < shares[0] <= shares[-1] <= 1
+
+
+def test_what_the_data_do_not_tell_stays_in_the_middle_and_says_so(subject):
+    result, _ = from_measurements("elbow", [measured(noisy(moved(subject)))], only=ONLY)
+    untold = next(e for e in result.estimates if e.name == "elbow_extensor.excitation_tau")
+    assert untold.informed < 0.01
+    low, high = untold.bounds
+    assert untold.value == pytest.approx(np.sqrt(low * high), rel=1e-3)
+    assert untold.low == pytest.approx(low, rel=0.01)
+    assert untold.high == pytest.approx(high, rel=0.01)
+
+
+def test_only_what_is_named_is_fitted(elbow):
+    measurement = measured(moved(replace(elbow, damping=0.2)))
+    result, _ = from_measurements("elbow", [measurement], only=["damping"])
+    assert [free.name for free in result.free] == ["damping"]
+    assert result.joint == replace(elbow, damping=result.joint.damping)
+    assert result.joint.damping == result.estimates[0].value
+
+
+def test_a_joint_held_still_is_known_by_the_torque_that_holds_it(subject):
+    names = ("elbow_flexor.max_isometric_force", "elbow_flexor.max_velocity")
+    result, (prediction,) = from_measurements("elbow", [held(subject)], only=("damping", *names))
+    assert prediction.quantity == "torque"
+    assert prediction.error == pytest.approx(TORQUE_NOISE, rel=0.1)
+    check(result, subject, names)
+    damping = next(e for e in result.estimates if e.name == "damping")
+    assert damping.informed < 0.01  # nothing moved
+
+
+def test_a_movement_may_be_predicted_as_torque(elbow):
+    subject = replace(elbow, damping=0.2)
+    # slow enough for a path that is smoothed at 10 Hz, and still moving at its end
+    movement = moved(
+        subject,
+        duration=0.6,
+        excitation={"elbow_flexor": mjhill.Signal(lambda t: 0.1 - 0.1 * np.cos(9 * t))},
+        torque=mjhill.Signal(lambda t: 1.5 - 1.5 * np.cos(9 * t)),
+    )
+    measurement = measured(noisy(movement, noise=1e-4))
+    result, (prediction,) = from_measurements(
+        "elbow", [measurement], only=["damping"], predict="torque"
+    )
+    assert prediction.quantity == "torque"
+    np.testing.assert_array_equal(prediction.measured, measurement.torque)
+    # smoothing bends the path by less than a degree, most where it ends
+    assert prediction.error < 0.1 * np.ptp(measurement.torque)
+    check(result, subject, ["damping"])
+
+
+def test_two_measurements_tell_more_than_one(subject):
+    movement, clamp = measured(noisy(moved(subject))), held(subject)
+    alone, _ = from_measurements("elbow", [movement], only=INFORMED)
+    both, predictions = from_measurements("elbow", [movement, clamp], only=INFORMED)
+    assert [p.quantity for p in predictions] == ["angle", "torque"]
+    assert [p.measurement.source for p in predictions] == ["movement", "clamp"]
+    check(both, subject, INFORMED)
+    for one, two in zip(alone.estimates, both.estimates, strict=True):
+        # the noise is found anew, to some per cent
+        assert two.high - two.low < 1.05 * (one.high - one.low), one.name
+
+
+def test_times_may_be_uneven(subject):
+    random = np.random.default_rng(2)
+    recording = noisy(moved(subject))
+    kept = np.sort(random.choice(np.arange(1, len(recording)), 400, replace=False))
+    # the inputs hold from sample to sample, so their jumps are kept
+    jumps = [0, 99, 100, 399, 400, 599, 600, 699, 700, len(recording) - 1]
+    result, (prediction,) = from_measurements(
+        "elbow", [measured(recording, np.union1d(kept, jumps))], only=INFORMED
+    )
+    assert prediction.error == pytest.approx(NOISE, rel=0.1)
+    check(result, subject, INFORMED)
+
+
+def test_a_measurement_may_begin_with_a_gap(subject):
+    recording = noisy(moved(subject))
+    kept = np.concatenate([[0], np.arange(80, len(recording))])
+    _, (prediction,) = from_measurements("elbow", [measured(recording, kept)], only=INFORMED)
+    assert prediction.error == pytest.approx(NOISE, rel=0.1)
+
+
+@pytest.mark.parametrize("noise", [NOISE, 1e-4])
+def test_a_measurement_may_begin_in_mid_movement(subject, noise):
+    # pushed from the first sample on, the elbow has turned 7 degrees after 50 ms
+    recording = noisy(moved(subject, torque=mjhill.pulse(6.0, 0.0, 0.1)), noise=noise, seed=2)
+    result, (prediction,) = from_measurements("elbow", [measured(recording)], only=INFORMED)
+    assert prediction.error == pytest.approx(noise, rel=0.15)
+    check(result, subject, INFORMED)
+
+
+def test_the_clock_of_a_measurement_may_start_anywhere(subject):
+    measurement = measured(noisy(moved(subject)))
+    later = replace(measurement, time=measurement.time + 100.0)
+    ends = [
+        from_measurements("elbow", [m], only=INFORMED)[0].joint.damping
+        for m in (measurement, later)
+    ]
+    # times of 100 s have their last bits elsewhere, and the noise is found to 2 % only
+    assert ends[0] == pytest.approx(ends[1], rel=1e-3)
+
+
+# --- refusals
+
+
+def still_life(**changes):
+    """A joint that does nothing."""
+    zeros = np.zeros(100)
+    measurement = Measurement(
+        "still.csv", np.arange(100) * 1e-3, {"elbow_flexor": zeros, "elbow_extensor": zeros},
+        np.ones(100), zeros,
+    )  # fmt: skip
+    return replace(measurement, **changes)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"joint": "wing"}, "unknown joint 'wing'; there are: elbow"),
+        ({"only": ["strength"]}, "elbow: unknown free parameter 'strength'; there are: damping"),
+        ({"predict": "force"}, "predict must be one of angle, torque, got 'force'"),
+        ({"measurements": []}, "there is no measurement to fit; give at least one"),
+        ({"predict": "angle"}, "still.csv: the angle never changes, so there is nothing to pred"),
+        ({}, "still.csv: the torque never changes, so there is nothing to predict"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused(arguments, message):
+    defaults = {"joint": "elbow", "measurements": [still_life()], "only": ["damping"]}
+    arguments = {**defaults, **arguments}
+    with pytest.raises(ValueError, match=message):
+        from_measurements(arguments.pop("joint"), arguments.pop("measurements"), **arguments)
