@@ -10,7 +10,7 @@ from mjhill.cli import main
 from mjhill.experiments.rig import rig, run, still
 from mjhill.joints import parameter_file, read_joints
 
-FILES = ["hip.png", "identify.json", "joints.toml"]
+FILES = ["hip.png", "identify.json", "joints.toml", "report.md"]
 
 
 def identify(*arguments):

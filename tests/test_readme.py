@@ -11,9 +11,9 @@ from click.testing import CliRunner
 import mjhill
 from mjhill.bench import accuracy
 from mjhill.cli import main
+from mjhill.identification.agreement import published_rows
 from mjhill.identification.facts import facts
 from mjhill.identification.free import free_parameters, value_of
-from mjhill.identification.literature import published_rows
 from mjhill.identification.report import brief
 from mjhill.layout import SLOTS
 

@@ -87,13 +87,15 @@ def _known(joints: tuple[str, ...], parameters: Path | None) -> list[str]:
 
 
 def _published(names: list[str], parameters: Path | None, files: dict[str, Path]) -> dict[str, Any]:
+    from mjhill.identification.agreement import published_rows, step_rows
     from mjhill.identification.facts import facts
-    from mjhill.identification.literature import from_literature, published_rows, step_rows
+    from mjhill.identification.literature import check_evidence, from_literature
     from mjhill.identification.plots import plot_literature
     from mjhill.identification.report import estimate_rows, fact_rows, markdown
     from mjhill.identification.writing import write_parameters
     from mjhill.joints import read_joints
 
+    check_evidence(names, parameters)
     results = []
     for index, name in enumerate(names):
         with progress_bar(f"fitting {name}, {index + 1} of {len(names)}") as progress:

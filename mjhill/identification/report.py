@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import degrees
 from typing import Any
 
+from mjhill.identification.agreement import published_rows, step_rows
 from mjhill.identification.facts import Fact
 from mjhill.identification.identified import Identified
-from mjhill.identification.literature import published_rows, step_rows
 from mjhill.identification.movement import Prediction
 from mjhill.parameters import Joint
 
