@@ -122,7 +122,7 @@ def runs(
         pose = still(bench, angle, before)
         batch.qpos[i], batch.act[i] = pose.qpos, pose.act
     first = np.array(batch.act)
-    control = np.zeros((count, steps, model.nu))
+    control = np.zeros((count, steps, model.nu))  # one input and one output an actuator
     control[:, :, model.actuator("dynamometer").id] = _drive(bench, machine, paths, before)
     for name, level in (excitation or {}).items():
         control[:, :, model.actuator(name).id] = level

@@ -59,8 +59,15 @@ def muscle_twitch(joint: Joint, muscle: str, *, width: float = PULSE) -> MuscleT
     """
     machine, angle = stiff_machine(joint), strongest_angle(joint, muscle)
     bench, along = rig(joint, machine=machine), direction(joint, muscle)
-    inputs = {"dynamometer": zeroed(joint, machine, angle), muscle: pulse(1.0, 0.0, width)}
-    single = run(bench, still(bench, angle), TWITCH_TIME, excitation=inputs)
+    single = run(
+        bench,
+        still(bench, angle),
+        TWITCH_TIME,
+        excitation={
+            "dynamometer": zeroed(joint, machine, angle),
+            muscle: pulse(1.0, 0.0, width),
+        },
+    )
     reading = -along * single["dynamometer.force"]
     torque = reading - reading[0]
     half = half_life(single.time, torque)
