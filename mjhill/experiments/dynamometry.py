@@ -123,7 +123,7 @@ def runs(
         batch.qpos[i], batch.act[i] = pose.qpos, pose.act
     first = np.array(batch.act)
     control = np.zeros((count, steps, model.nu))  # one input and one output an actuator
-    control[:, :, model.actuator("dynamometer").id] = _drive(bench, machine, paths, before)
+    control[:, :, model.actuator("dynamometer").id] = driven(bench, machine, paths, before)
     for name, level in (excitation or {}).items():
         control[:, :, model.actuator(name).id] = level
     with installed():
@@ -171,10 +171,10 @@ def active_torque(
     return active, direction(joint, muscle) * (active.torque - relaxed.torque)
 
 
-def _drive(
+def driven(
     bench: Rig, machine: Dynamometer, paths: Values, before: Mapping[str, float] | None
 ) -> Values:
-    """Input of the machine over each step [N·m], shape (N, T)."""
+    """Input [N·m] that takes a machine along paths, shape (N, T); arguments as in ``runs``."""
     speed = np.gradient(paths, bench.timestep, axis=1)
     start = [zeroed(bench.joint, machine, angle, before) for angle in paths[:, 0].tolist()]
     wound = np.array(start) - machine.stiffness * paths[:, 0]
