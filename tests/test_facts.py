@@ -9,6 +9,7 @@ import pytest
 import mjhill
 from mjhill.experiments.free_velocity import free_velocity
 from mjhill.experiments.impedance import held_impedance, passive_stiffness, stiffness_slope
+from mjhill.experiments.muscle_twitch import muscle_twitch
 from mjhill.experiments.rig import (
     UnmeasuredError,
     angles,
@@ -20,7 +21,6 @@ from mjhill.experiments.rig import (
     strongest_angle,
 )
 from mjhill.experiments.turn import turn
-from mjhill.experiments.twitch import twitch
 from mjhill.identification.facts import Fact, facts, read_entries
 from mjhill.reference import plant_torque
 
@@ -151,8 +151,10 @@ def test_a_turn_wider_than_the_range_or_too_far_for_its_time_is_not_measured():
 
 
 def test_a_twitch_peaks_later_and_relaxes_more_slowly_with_larger_time_constants():
-    fast = twitch(make_joint(), "puller")
-    slow = twitch(make_joint(replace(MUSCLE, excitation_tau=0.06, deactivation_tau=0.08)), "puller")
+    fast = muscle_twitch(make_joint(), "puller")
+    slow = muscle_twitch(
+        make_joint(replace(MUSCLE, excitation_tau=0.06, deactivation_tau=0.08)), "puller"
+    )
     assert slow.contraction > fast.contraction > 0
     assert slow.half_relaxation > fast.half_relaxation > 0
     assert 0 < fast.share < 1
@@ -160,9 +162,9 @@ def test_a_twitch_peaks_later_and_relaxes_more_slowly_with_larger_time_constants
 
 def test_a_twitch_is_isometric_at_the_angle_of_the_largest_force():
     joint = make_joint(replace(MUSCLE, optimal_length=0.3))
-    angle = twitch(joint, "puller").run["joint.angle"]
+    angle = muscle_twitch(joint, "puller").run["joint.angle"]
     assert angle[0] == pytest.approx(-0.3)
-    assert np.ptp(angle) < 1e-6
+    assert np.ptp(angle) < radians(0.2)  # what the dynamometer gives way
     assert strongest_angle(make_joint(range=(-0.1, 1.0)), "puller") == 0.0
     assert strongest_angle(replace(joint, range=(-0.1, 1.0)), "puller") == -0.1
 

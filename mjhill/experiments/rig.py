@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 
 from mjhill.equilibrium import equilibrate
 from mjhill.install import installed, without_python_callbacks
+from mjhill.joints import JOINTS
 from mjhill.parameters import Joint
 from mjhill.readings import steady_stretch, tension
 from mjhill.recording import Recording
@@ -30,6 +31,19 @@ _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS  # time, angle, velocity, then the 
 
 class UnmeasuredError(RuntimeError):
     """What was to be measured is not seen in this joint; the message says why."""
+
+
+def as_joint(joint: str | Joint) -> Joint:
+    """A joint that comes with mjhill, by name; any other as it is.
+
+    Raises:
+        ValueError: There is none of that name.
+    """
+    if isinstance(joint, Joint):
+        return joint
+    if joint not in JOINTS:
+        raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(JOINTS)}")
+    return JOINTS[joint]
 
 
 @dataclass(frozen=True)

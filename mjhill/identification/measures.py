@@ -11,8 +11,8 @@ from types import MappingProxyType
 
 from mjhill.experiments.free_velocity import free_velocity
 from mjhill.experiments.impedance import held_impedance, passive_stiffness, stiffness_slope
+from mjhill.experiments.muscle_twitch import muscle_twitch
 from mjhill.experiments.turn import Turn, turn
-from mjhill.experiments.twitch import twitch
 from mjhill.parameters import Joint
 
 Measure = Callable[..., float]
@@ -41,15 +41,15 @@ def _turn_duration(
 
 
 def _twitch_contraction(joint: Joint, muscle: str) -> float:
-    return twitch(joint, muscle).contraction
+    return muscle_twitch(joint, muscle).contraction
 
 
 def _twitch_half_relaxation(joint: Joint, muscle: str) -> float:
-    return twitch(joint, muscle).half_relaxation
+    return muscle_twitch(joint, muscle).half_relaxation
 
 
 def _twitch_share(joint: Joint, muscle: str) -> float:
-    return twitch(joint, muscle).share
+    return muscle_twitch(joint, muscle).share
 
 
 def _passive_stiffness(joint: Joint, _: str, *, degrees: float) -> float:

@@ -1,0 +1,27 @@
+"""What the figures of experiments have in common."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def torque_unit(largest: float) -> tuple[float, str]:
+    """Factor from N·m and unit in which torques up to ``largest`` [N·m] are easy to read."""
+    return (1e3, "mN·m") if abs(largest) < 0.1 else (1.0, "N·m")
+
+
+def tidy(axes: Any) -> None:
+    """A pale grid and no box."""
+    axes.grid(color="0.9", lw=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def legend_above(figure: Any, handles: Any, columns: int = 4) -> None:
+    """One legend for the whole figure, above it, where no data are."""
+    figure.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False)
+
+
+def spoken(muscle: str) -> str:
+    """The name of a muscle in words."""
+    return muscle.replace("_", " ")
