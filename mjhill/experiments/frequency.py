@@ -195,4 +195,4 @@ def _component(basis: _Values, values: _Values) -> tuple[complex, float]:
 
 def _complex(gain: ArrayLike, phase: ArrayLike) -> NDArray[np.complex128]:
     turned = np.exp(1j * np.asarray(phase, dtype=np.float64))
-    return np.asarray(gain, dtype=np.float64) * np.asarray(turned)
+    return np.asarray(np.asarray(gain, dtype=np.float64) * turned)
