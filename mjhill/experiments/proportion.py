@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.elements import active_length_factor
 from mjhill.experiments.rig import direction
+from mjhill.experiments.variants import with_flat_torque, with_linear_elasticity
 from mjhill.identification.ensemble import angles
 from mjhill.parameters import Joint
-from mjhill.reference import plant_torque
 
 AS_IT_IS = "as it is"
 LINEAR, FLAT = "with a linear elasticity", "with a flat torque-angle relation"
 LONG = 10.0  # by when the slowest joint has settled [s]
-_WIDE = 1e3  # widths [rad] that leave nothing of the active torque-angle relation
 
 _Values = NDArray[np.float64]
 
@@ -54,8 +51,8 @@ def proportions(
     ]
     conditions: dict[str, list[Joint]] = {
         AS_IT_IS: [joint] * count,
-        LINEAR: [_with_linear_elasticity(joint, *pair) for pair in zip(names, lows, strict=True)],
-        FLAT: [_with_flat_torque(joint, *pair) for pair in zip(names, lows, strict=True)],
+        LINEAR: [with_linear_elasticity(joint, *pair) for pair in zip(names, lows, strict=True)],
+        FLAT: [with_flat_torque(joint, *pair) for pair in zip(names, lows, strict=True)],
     }
     joints = [one for several in conditions.values() for one in several]
     tasks = [(muscle, high) for _ in conditions for muscle in names]
@@ -65,20 +62,3 @@ def proportions(
         muscle: dict(zip(conditions, ratios[:, k].tolist(), strict=True))
         for k, muscle in enumerate(names)
     }
-
-
-def _with_linear_elasticity(joint: Joint, muscle: str, travel: float) -> Joint:
-    """The joint with the passive torque of this travel [rad] spread evenly over it."""
-    torque = plant_torque(joint, joint.rest_angle + direction(joint, muscle) * travel)
-    linear = replace(joint.passive, k1_pos=0.0, k1_neg=0.0)
-    return replace(joint, stiffness=abs(torque / travel), passive=linear)
-
-
-def _with_flat_torque(joint: Joint, muscle: str, travel: float) -> Joint:
-    """The joint with the isometric torque of this travel [rad] at every angle."""
-    own = joint.muscles[muscle]
-    length = joint.gears[muscle] * (joint.rest_angle + direction(joint, muscle) * travel)
-    share = active_length_factor(length, own.optimal_length, own.width_short, own.width_long)
-    force = share * own.max_isometric_force
-    flat = replace(own, max_isometric_force=force, width_short=_WIDE, width_long=_WIDE)
-    return replace(joint, muscles={**joint.muscles, muscle: flat})
