@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 import mjhill
 from mjhill.experiments.free_pulse import FreePulse, free_pulse
 from mjhill.experiments.pulses import AS_IT_IS, FAST, ratio_at, ratio_over_time
-from mjhill.experiments.rest import relaxed_angle
+from mjhill.experiments.rest import resting_angle
 from mjhill.experiments.rig import UnmeasuredError
 from mjhill.reference import rest_state, simulate
 from mjhill.signals import pulse
@@ -26,7 +26,7 @@ def test_the_elbow_bears_out_what_the_paper_says_of_pulses():
 
 def test_the_strongest_pulse_moves_the_joint_as_the_stiff_solver_says(elbow):
     strongest = elbow_pulse().strengths[-1]
-    start = relaxed_angle(elbow)
+    start = resting_angle(elbow)
     reference = simulate(
         elbow,
         {"elbow_flexor": pulse(1.0, 0.0, 0.1)},
@@ -75,12 +75,12 @@ def test_a_joint_without_muscles_tension_stays_at_its_angle_of_rest(elbow):
     tense = {
         name: replace(muscle, max_isometric_force=1e-9) for name, muscle in elbow.muscles.items()
     }
-    assert relaxed_angle(replace(elbow, muscles=tense)) == pytest.approx(elbow.rest_angle)
+    assert resting_angle(replace(elbow, muscles=tense)) == pytest.approx(elbow.rest_angle)
 
 
 def test_a_relaxed_joint_stays_where_it_is():
     ankle = mjhill.JOINTS["ankle"]
-    angle = relaxed_angle(ankle)
+    angle = resting_angle(ankle)
     assert abs(angle - ankle.rest_angle) > radians(0.1)
     run = simulate(ankle, {}, duration=0.5, start=rest_state(ankle, angle))
     assert np.ptp(run["ankle.angle"]) < 1e-6

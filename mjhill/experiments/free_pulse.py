@@ -26,7 +26,7 @@ from mjhill.experiments.pulses import (
     pulses,
     ratio_at,
 )
-from mjhill.experiments.rest import relaxed_angle
+from mjhill.experiments.rest import resting_angle
 from mjhill.experiments.result import Claim, Measure, Result
 from mjhill.experiments.rig import as_joint, rig, run, still
 from mjhill.parameters import Joint
@@ -198,7 +198,7 @@ def free_pulse(
     strongest = strengths[-1]
     single = run(
         bench,
-        still(bench, relaxed_angle(joint)),
+        still(bench, resting_angle(joint)),
         min(duration, 2 * strongest.time_to_amplitude),
         excitation={muscle: pulse(strongest.level, 0.0, width)},
     )

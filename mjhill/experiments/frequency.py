@@ -24,9 +24,10 @@ class Response:
     Attributes:
         gain: Amplitude of the output over that of the drive.
         phase: Of the output before the drive, in (-π, π] [rad].
-        coherence: Share of the output's variance that a sinusoid of the driving frequency accounts
-            for, times the same share of the drive [-]; 1 less this is distortion. The coherence
-            that averages spectra over segments would be 1 for any periodic answer.
+        coherence: Share of the output's variance about a straight line that a sinusoid of the
+            driving frequency accounts for, times the same share of the drive [-]; 1 less this is
+            distortion. The coherence that averages spectra over segments would be 1 for any
+            periodic answer.
     """
 
     gain: float
@@ -62,6 +63,8 @@ class SecondOrderFrequency:
 def response_at(time: _Values, drive: _Values, output: _Values, frequency: float) -> Response:
     """Gain, phase and coherence at one frequency, over the last whole cycles of a record.
 
+    A straight line is fitted beside the sinusoid, so that a slow drift does no harm.
+
     Args:
         time: Evenly spaced sample times [s], shape (T,); leave the transient out.
         drive: What drives, shape (T,).
@@ -81,7 +84,8 @@ def response_at(time: _Values, drive: _Values, output: _Values, frequency: float
         )
     last = slice(len(time) - round(cycles / (frequency * step)), None)
     turning = 2 * pi * frequency * time[last]
-    basis = np.stack([np.cos(turning), np.sin(turning), np.ones_like(turning)], axis=1)
+    line = np.stack([np.ones_like(turning), time[last] - time[last].mean()], axis=1)
+    basis = np.column_stack([np.cos(turning), np.sin(turning), line])
     (driving, drive_share), (answer, output_share) = (
         _component(basis, values[last]) for values in (drive, output)
     )
@@ -185,9 +189,14 @@ def octaves(low: float, high: float, per_octave: int = 3) -> _Values:
 
 
 def _component(basis: _Values, values: _Values) -> tuple[complex, float]:
-    """Complex amplitude of cos and sin in ``values``, and the share of variance they explain."""
+    """Complex amplitude of cos and sin in ``values``, and the share of variance they explain.
+
+    The other columns of ``basis`` are those of the line that the variance is about.
+    """
     found, *_ = np.linalg.lstsq(basis, values, rcond=None)
-    variance = float(np.var(values))
+    line = basis[:, 2:]
+    about, *_ = np.linalg.lstsq(line, values, rcond=None)
+    variance = float(np.var(values - line @ about))
     left = float(np.var(values - basis @ found))
     share = 1.0 - left / variance if variance > 0 else 0.0
     return complex(found[0], -found[1]), share

@@ -9,7 +9,7 @@ from math import degrees
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.rest import relaxed_angle
+from mjhill.experiments.rest import resting_angle
 from mjhill.experiments.result import Measure
 from mjhill.experiments.rig import UnmeasuredError, direction
 from mjhill.experiments.variants import (
@@ -102,7 +102,7 @@ def pulses(
         # a pulse that ends inside a step ends in a level in between
         share = np.clip((width - middle) / timestep + 0.5, 0.0, 1.0)
         inputs[i, :, list(joints[0].muscles).index(muscle)] = level * share
-    rest = [relaxed_angle(joint) for joint in joints]
+    rest = [resting_angle(joint) for joint in joints]
     runs = angles(joints, start=rest, excitation=inputs, steps=steps, timestep=timestep)
     travels = direction(joints[0], muscle) * (runs - runs[:, :1])
     if (travels.argmax(axis=1) == steps).any():

@@ -1,6 +1,8 @@
-"""Where a joint stays when its muscles are relaxed."""
+"""Where a free joint stays."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 from scipy.optimize import brentq
 
@@ -9,18 +11,23 @@ from mjhill.parameters import Joint
 from mjhill.reference import plant_torque
 
 
-def relaxed_angle(joint: Joint) -> float:
-    """Angle [rad] at which a free joint stays without input.
+def resting_angle(joint: Joint, levels: Mapping[str, float] | None = None) -> float:
+    """Angle [rad] at which a free joint stays under constant inputs, by default none.
 
     Relaxed muscles keep a trace of tension, which moves it a little from the angle without passive
-    torque.
+    torque. A joint that nothing holds inside its range is taken to stay at that angle.
+
+    Args:
+        joint: The joint.
+        levels: Input of each muscle; by default 0.
     """
 
     def net(angle: float) -> float:
-        muscles = sum(muscle_torque(joint, name, 0.0, angle) for name in joint.muscles)
+        inputs = {**dict.fromkeys(joint.muscles, 0.0), **(levels or {})}
+        muscles = sum(muscle_torque(joint, name, u, angle) for name, u in inputs.items())
         return plant_torque(joint, angle) + muscles
 
     low, high = joint.range
-    if net(low) * net(high) > 0:  # no elasticity holds it in its range
+    if net(low) * net(high) > 0:
         return joint.rest_angle
     return float(brentq(net, low, high, xtol=1e-12))
