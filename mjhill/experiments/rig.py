@@ -216,6 +216,19 @@ def angles(
     return np.concatenate([state[1:2], states[0, :, 1]])
 
 
+def as_joint(joint: str | Joint) -> Joint:
+    """A joint by its name, or as it is.
+
+    Raises:
+        ValueError: No joint that comes with mjhill has this name; the message lists them.
+    """
+    if isinstance(joint, Joint):
+        return joint
+    if joint not in JOINTS:
+        raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(JOINTS)}")
+    return JOINTS[joint]
+
+
 def direction(joint: Joint, muscle: str) -> float:
     """1 where a muscle pulls towards positive angles, -1 where towards negative ones."""
     return -float(np.sign(joint.gears[muscle]))
