@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 import mjhill
 from mjhill.experiments.isotonic import BOTH, INERTIA, NAIVE, Isotonic, isotonic
-from mjhill.experiments.release import RELEASE, own_curve
+from mjhill.experiments.quick_release import RELEASE, own_curve
 from mjhill.experiments.rig import UnmeasuredError
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.experiments.isotonic_figure import draw_releases, draw_torques
-from mjhill.experiments.release import (
+from mjhill.experiments.quick_release import (
     RELEASE,
     Point,
     net_torque,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.release import RELEASE
+from mjhill.experiments.quick_release import RELEASE
 from mjhill.recording import Recording
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 
