@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 
 from mjhill.equilibrium import equilibrate
 from mjhill.install import installed, without_python_callbacks
+from mjhill.joints import JOINTS
 from mjhill.parameters import Joint
 from mjhill.readings import steady_stretch, tension
 from mjhill.recording import Recording
@@ -200,6 +201,19 @@ def angles(
             bench.model, mujoco.MjData(bench.model), state[np.newaxis], control
         )
     return np.concatenate([state[1:2], states[0, :, 1]])
+
+
+def as_joint(joint: str | Joint) -> Joint:
+    """A joint by its name, or as it is.
+
+    Raises:
+        ValueError: No joint that comes with mjhill has this name; the message lists them.
+    """
+    if isinstance(joint, Joint):
+        return joint
+    if joint not in JOINTS:
+        raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(JOINTS)}")
+    return JOINTS[joint]
 
 
 def direction(joint: Joint, muscle: str) -> float:
