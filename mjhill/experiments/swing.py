@@ -23,7 +23,7 @@ class Swing:
     A muscle yields within tenths of a second (its series element stretches at once, its contractile
     element follows), so that no one spring and damper describe both the swing and what comes later.
     The fit is therefore of twice the time to the first peak, half a cycle of an undamped system;
-    of the whole run where there is no peak.
+    of the whole run where there is no peak, or of a window that was asked for.
 
     Attributes:
         inertia: J of all that moves [kg·m²].
@@ -59,7 +59,12 @@ class Swing:
 
 
 def first_swing(
-    time: _Values, deflection: _Values, velocity: _Values, load: _Values, inertia: float
+    time: _Values,
+    deflection: _Values,
+    velocity: _Values,
+    load: _Values,
+    inertia: float,
+    window: float | None = None,
 ) -> Swing:
     """The first swing, towards positive deflections, under a load.
 
@@ -69,11 +74,14 @@ def first_swing(
         velocity: [rad/s], shape (T,).
         load: What is added to the steady load [N·m], shape (T,).
         inertia: J of all that moves [kg·m²].
+        window: Length of what is fitted [s]; see ``Swing`` for what it is without.
     """
     turns = np.flatnonzero((velocity[:-1] > 0) & (velocity[1:] <= 0))
     turned = int(turns[0]) + 1 if len(turns) else None
     end = len(time) if turned is None else min(2 * turned + 1, len(time))
     peak = float(deflection[:end].max())
+    if window is not None:
+        end = min(round(window / (time[1] - time[0])) + 1, len(time))
     fit = second_order_fit(time[:end], deflection[:end], velocity[:end], load[:end], inertia)
     left = deflection - second_order_response(fit, inertia, time, load)
     return Swing(
@@ -107,5 +115,5 @@ def swing_measures(label: str, swing: Swing) -> Iterator[Measure]:
     yields = "" if swing.stiffness > 0 else "the fitted stiffness is not positive"
     yield Measure(f"natural frequency, {label}", swing.natural_frequency, "Hz", note=yields)
     yield Measure(f"damping ratio, {label}", swing.damping_ratio, "-", note=yields)
-    yield Measure(f"misfit of the first swing, {label}", swing.misfit, "-")
+    yield Measure(f"misfit of the fit, {label}", swing.misfit, "-")
     yield Measure(f"misfit of the whole run, {label}", swing.misfit_of_run, "-")
