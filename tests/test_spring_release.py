@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 import mjhill
 from mjhill.experiments.posture import balanced
-from mjhill.experiments.release import release
 from mjhill.experiments.rig import UnmeasuredError
 from mjhill.experiments.spring_release import spring_release
+from mjhill.experiments.spring_trial import release
 
 
 @pytest.fixture(scope="module")

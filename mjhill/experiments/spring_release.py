@@ -33,10 +33,10 @@ from mjhill.experiments.posture import (
     held_levels,
     steadiest,
 )
-from mjhill.experiments.release import Release, release
 from mjhill.experiments.result import Claim, Measure, Result
 from mjhill.experiments.rig import as_joint
 from mjhill.experiments.spring_release_figure import draw
+from mjhill.experiments.spring_trial import Release, release
 from mjhill.experiments.swing import swing_measures
 from mjhill.parameters import Joint
 from mjhill.recording import Recording

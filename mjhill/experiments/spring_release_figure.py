@@ -10,8 +10,8 @@ from mjhill.experiments.external_impulse_figure import shades, tidy
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 
 if TYPE_CHECKING:
-    from mjhill.experiments.release import Release
     from mjhill.experiments.spring_release import SpringRelease
+    from mjhill.experiments.spring_trial import Release
 
 _SHOWN = 0.7  # [s]
 _MARKS = "osD^v"
