@@ -91,6 +91,9 @@ def reproduce(
             waiting.append(part)
     run = _Run(store, outcome, prints, video, jobs, progress or (lambda share: None))
     run.all(waiting, done=len(wanted) - len(waiting))
+    # side by side they end in any order
+    outcome.ran = [part.name for part in wanted if part.name in outcome.ran]
+    outcome.missing = {p: outcome.missing[p] for p in wanted if p in outcome.missing}
     for part in every_part(catalogue):
         word = prints[part.entry.id]
         numbers = store.read(part, word) if isinstance(word, str) else None
