@@ -325,6 +325,20 @@ def test_unknown_names_end_in_exit_code_2_and_write_nothing(tmp_path, arguments,
     assert not (tmp_path / "out").exists()
 
 
+def test_the_command_runs_an_experiment_of_the_paper_once(tmp_path):
+    pytest.importorskip("mjhill.experiments.tetanus")
+    command = ["reproduce", "--only", "tetanus", "--joint", "eye", "--no-video", "-o", "out"]
+    first = CliRunner().invoke(main, [*command, "--json"])
+    assert first.exit_code == 0, first.stderr
+    (part,) = json.loads(first.stdout)["parts"]
+    assert (part["id"], part["joint"]) == ("tetanus", "eye")
+    assert part["measures"]
+    before = made("out")
+    again = CliRunner().invoke(main, command)
+    assert "report.html" in again.stdout
+    assert made("out")["tetanus-eye.json"] == before["tetanus-eye.json"]
+
+
 def test_a_run_is_shown_slowly_enough_and_no_longer_than_four_seconds():
     assert film_speed(4.0) == 1
     assert film_speed(0.2) == 0.05
