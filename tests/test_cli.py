@@ -8,6 +8,7 @@ from click.testing import CliRunner
 
 import mjhill
 from mjhill.cli import main
+from mjhill.cli.printing import print_table
 
 
 def invoke(*arguments):
@@ -17,6 +18,13 @@ def invoke(*arguments):
 def test_list_names_every_joint():
     rows = json.loads(invoke("list", "--json").stdout)
     assert [row["joint"] for row in rows] == list(mjhill.JOINTS)
+
+
+def test_the_head_of_a_table_shows_its_units(capsys):
+    print_table([{"time [s]": 0.25, "of": "[b]"}], False, title="Times")
+    printed = capsys.readouterr().out
+    assert "time [s]" in printed
+    assert "[b]" in printed
 
 
 def test_info_gives_value_unit_and_source_of_every_parameter():

@@ -1,4 +1,4 @@
-"""The commands: demo, list, info, run, video, compare, bench; identify has a file of its own."""
+"""The commands, but for identify and reproduce, which have files of their own."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import click
 
 from mjhill.cli.identify import identify
 from mjhill.cli.printing import json_option, print_paths, print_table, progress_bar, shown
+from mjhill.cli.reproduce import reproduce
 
 _OUT = Path("out")
 _SUFFIXES = {"recording": (".csv", ".npz"), "plot": (".png",), "video": (".mp4", ".gif")}
@@ -41,6 +42,7 @@ def main() -> None:
 
 
 main.add_command(identify)
+main.add_command(reproduce)
 
 
 def _inputs_option(function: Any) -> Any:

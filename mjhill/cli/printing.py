@@ -34,15 +34,16 @@ def print_table(rows: list[dict[str, Any]], as_json: bool, title: str, across: b
         click.echo(json.dumps(rows, ensure_ascii=False))
         return
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     if not across:
         rows = [{"quantity": key, "value": value} for row in rows for key, value in row.items()]
     table = Table(title=title, title_justify="left")
     for column in rows[0] if rows else []:
-        table.add_column(column)
+        table.add_column(escape(column))  # a unit such as [s] is no markup
     for row in rows:
-        table.add_row(*(shown(value) for value in row.values()))
+        table.add_row(*(escape(shown(value)) for value in row.values()))
     # a pipe has no width of its own; rich would cut the sources at 80 columns
     Console(width=None if sys.stdout.isatty() else 160).print(table)
 

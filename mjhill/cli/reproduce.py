@@ -1,0 +1,83 @@
+"""The command ``mjhill reproduce``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from mjhill.cli.printing import json_option, print_paths, print_table, progress_bar
+
+
+@click.command()
+@click.option("--only", multiple=True, metavar="ID", help="Only this experiment.")
+@click.option(
+    "--joint", "joints", multiple=True, metavar="NAME",
+    help="On this joint; without any, each experiment on its own ones.",
+)  # fmt: skip
+@click.option("--video/--no-video", default=True, show_default=True)
+@click.option("--fresh", is_flag=True, help="Run again what is there already.")
+@click.option(
+    "--jobs", "-j", type=click.IntRange(min=1),
+    help="How many to run at once; by default a core each, up to 4.",
+)  # fmt: skip
+@click.option(
+    "--output", "-o", type=click.Path(path_type=Path), default=Path("out", "reproduce"),
+    show_default=True, help="Folder.",
+)  # fmt: skip
+@json_option
+def reproduce(
+    only: tuple[str, ...],
+    joints: tuple[str, ...],
+    video: bool,
+    fresh: bool,
+    jobs: int | None,
+    output: Path,
+    as_json: bool,
+) -> None:
+    """Run the experiments of Winters & Stark (1987) and say which of the paper's claims hold.
+
+    Numbers, figures and videos go to the folder, with a page, report.html, that shows them all.
+    What is there already is not run again, unless its sources or parameters have changed. The
+    exit code is 1 where something failed and 130 after an interruption; what was finished by
+    then is kept, and reported.
+    """
+    from mjhill.reproduction import report_of, write_report
+    from mjhill.reproduction import reproduce as run
+
+    with progress_bar("reproducing") as progress:
+        outcome = run(
+            output, only=only, joints=joints, video=video, fresh=fresh, jobs=jobs,
+            progress=progress,
+        )  # fmt: skip
+    report = report_of(outcome)
+    paths = write_report(report, output)
+    if as_json:
+        click.echo(json.dumps(report, ensure_ascii=False))
+    else:
+        _print(report)
+        print_paths(paths)
+    sys.exit(outcome.exit_code)
+
+
+def _print(report: dict[str, Any]) -> None:
+    rows = [
+        {
+            "experiment": part["id"],
+            "joint": part["joint"],
+            "claims": len(part["claims"]),
+            "hold": [claim["holds"] for claim in part["claims"]].count(True),
+            "time [s]": float(part["seconds"]),
+        }
+        for part in report["parts"]
+    ]
+    print_table(rows, False, title="Winters & Stark (1987)")
+    count = report["claims"]
+    click.echo(f"claims: {', '.join(f'{number} {word}' for word, number in count.items())}")
+    for part in report["missing"]:
+        click.echo(f"missing: {part['id']}, {part['joint']}: {part['reason']}", err=True)
+    for part in report["problems"]:
+        click.echo(f"problem: {part['name']}: {part['problem']}", err=True)
