@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from mjhill import JOINTS
+from mjhill.experiments.bench.rig import rig, run, still, strongest_angle
 from mjhill.experiments.result import Claim, Measure, Result
-from mjhill.experiments.rig import rig, run, still, strongest_angle
 from mjhill.recording import Recording
 from mjhill.reproduction import Entry
 

@@ -7,15 +7,15 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.external_impulse import external_impulse
-from mjhill.experiments.hit import Hammer
-from mjhill.experiments.linear_elements import (
+from mjhill.experiments.bench.linear_elements import (
     contractile_viscosity,
     linear_elements,
     series_stiffness,
 )
-from mjhill.experiments.posture import balanced
-from mjhill.experiments.rig import UnmeasuredError
+from mjhill.experiments.bench.posture import balanced
+from mjhill.experiments.bench.rig import UnmeasuredError
+from mjhill.experiments.paper.external_impulse import external_impulse
+from mjhill.experiments.trials.hit import Hammer
 
 
 @pytest.fixture(scope="module")

@@ -7,11 +7,11 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.drives import Drive
-from mjhill.experiments.external_sinusoid import external_sinusoid
-from mjhill.experiments.posture import net_torque
-from mjhill.experiments.rig import UnmeasuredError, muscle_torque, rig
-from mjhill.experiments.sinusoids import Curve, shaken
+from mjhill.experiments.bench.drives import Drive
+from mjhill.experiments.bench.posture import net_torque
+from mjhill.experiments.bench.rig import UnmeasuredError, muscle_torque, rig
+from mjhill.experiments.paper.external_sinusoid import external_sinusoid
+from mjhill.experiments.trials.sinusoids import Curve, shaken
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,7 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.experiments.free_velocity import free_velocity
-from mjhill.experiments.impedance import held_impedance, passive_stiffness, stiffness_slope
-from mjhill.experiments.muscle_twitch import muscle_twitch
-from mjhill.experiments.rig import (
+from mjhill.experiments.bench.rig import (
     UnmeasuredError,
     angles,
     holding,
@@ -20,7 +17,10 @@ from mjhill.experiments.rig import (
     still,
     strongest_angle,
 )
-from mjhill.experiments.turn import turn
+from mjhill.experiments.trials.free_velocity import free_velocity
+from mjhill.experiments.trials.impedance import held_impedance, passive_stiffness, stiffness_slope
+from mjhill.experiments.trials.muscle_twitch import muscle_twitch
+from mjhill.experiments.trials.turn import turn
 from mjhill.identification.facts import Fact, facts, read_entries
 from mjhill.reference import plant_torque
 

@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 import mjhill
 from mjhill.cli import main
-from mjhill.experiments.rig import rig, run, still
+from mjhill.experiments.bench.rig import rig, run, still
 from mjhill.joints import parameter_file, read_joints
 
 FILES = ["hip.png", "identify.json", "joints.toml", "report.md"]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.experiments.rig import rig, run, still
+from mjhill.experiments.bench.rig import rig, run, still
 from mjhill.identification.free import value_of
 from mjhill.identification.measurement import Measurement, read_measurement
 from mjhill.identification.movement import from_measurements

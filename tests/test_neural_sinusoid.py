@@ -7,9 +7,9 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.frequency import octaves
-from mjhill.experiments.neural_sinusoid import NeuralSinusoid, neural_sinusoid
-from mjhill.experiments.rest import resting_angle
+from mjhill.experiments.bench.frequency import octaves
+from mjhill.experiments.bench.rest import resting_angle
+from mjhill.experiments.paper.neural_sinusoid import NeuralSinusoid, neural_sinusoid
 from mjhill.reference import rest_state, simulate
 from mjhill.signals import constant, sinusoid
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.experiments.posture import (
+from mjhill.experiments.bench.posture import (
     balanced,
     check_ascending,
     held_levels,
@@ -16,7 +16,7 @@ from mjhill.experiments.posture import (
     stay,
     steadiest,
 )
-from mjhill.experiments.rig import UnmeasuredError, angles, rig, still
+from mjhill.experiments.bench.rig import UnmeasuredError, angles, rig, still
 
 
 def symmetric(optimum):

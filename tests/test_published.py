@@ -4,7 +4,7 @@ from types import MappingProxyType
 import pytest
 
 import mjhill
-from mjhill.experiments.rig import muscle_torque, rig, run, still
+from mjhill.experiments.bench.rig import muscle_torque, rig, run, still
 from mjhill.identification.published import (
     EndAngle,
     PassiveTorque,

@@ -129,7 +129,7 @@ def test_a_changed_experiment_is_run_again_and_what_is_older_not_shown(tmp_path,
 
 
 def test_the_sources_of_an_experiment_reach_down_to_the_equations():
-    names = {path.name for path in sources("mjhill.experiments.twitch")}
+    names = {path.name for path in sources("mjhill.experiments.paper.twitch")}
     assert {"twitch.py", "rig.py", "elements.py", "compiled.py"} <= names
     assert "reproduce.py" not in names
 
@@ -326,7 +326,7 @@ def test_unknown_names_end_in_exit_code_2_and_write_nothing(tmp_path, arguments,
 
 
 def test_the_command_runs_an_experiment_of_the_paper_once(tmp_path):
-    pytest.importorskip("mjhill.experiments.tetanus")
+    pytest.importorskip("mjhill.experiments.paper.tetanus")
     command = ["reproduce", "--only", "tetanus", "--joint", "eye", "--no-video", "-o", "out"]
     first = CliRunner().invoke(main, [*command, "--json"])
     assert first.exit_code == 0, first.stderr

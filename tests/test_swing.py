@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lsim
 
 from mjhill.comparison.responses import SecondOrder
-from mjhill.experiments.swing import first_swing, second_order_response, swing_measures
+from mjhill.experiments.trials.swing import first_swing, second_order_response, swing_measures
 
 
 def swung(stiffness, damping, inertia=0.1, width=0.02, duration=2.0):

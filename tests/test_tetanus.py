@@ -6,8 +6,8 @@ import pytest
 from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
 
-from mjhill.experiments.rig import muscle_torque
-from mjhill.experiments.tetanus import tetanus
+from mjhill.experiments.bench.rig import muscle_torque
+from mjhill.experiments.paper.tetanus import tetanus
 
 
 def contraction(muscle=MUSCLE, **changes):

@@ -7,15 +7,15 @@ from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.dynamometry import (
+from mjhill.experiments.bench.dynamometry import (
     active_torque,
     machine_giving_way,
     runs,
     stiff_machine,
     stimulated,
 )
-from mjhill.experiments.rig import UnmeasuredError, muscle_torque
-from mjhill.experiments.twitch import twitch
+from mjhill.experiments.bench.rig import UnmeasuredError, muscle_torque
+from mjhill.experiments.paper.twitch import twitch
 
 # --- the dynamometer
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from mjhill.experiments.rig import UnmeasuredError
+from mjhill.experiments.bench.rig import UnmeasuredError
 from mjhill.identification.measures import MEASURES
 from mjhill.joints import JOINTS
 from mjhill.parameters import Joint

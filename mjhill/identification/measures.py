@@ -9,10 +9,10 @@ from collections.abc import Callable, Mapping, Sequence
 from math import radians
 from types import MappingProxyType
 
-from mjhill.experiments.free_velocity import free_velocity
-from mjhill.experiments.impedance import held_impedance, passive_stiffness, stiffness_slope
-from mjhill.experiments.muscle_twitch import muscle_twitch
-from mjhill.experiments.turn import Turn, turn
+from mjhill.experiments.trials.free_velocity import free_velocity
+from mjhill.experiments.trials.impedance import held_impedance, passive_stiffness, stiffness_slope
+from mjhill.experiments.trials.muscle_twitch import muscle_twitch
+from mjhill.experiments.trials.turn import Turn, turn
 from mjhill.parameters import Joint
 
 Measure = Callable[..., float]

@@ -65,7 +65,7 @@ class Part:
 
 
 def _entry(name: str, *joints: str, filmed: bool = False) -> Entry:
-    return Entry(name, f"mjhill.experiments.{name}:{name}", joints, filmed)
+    return Entry(name, f"mjhill.experiments.paper.{name}:{name}", joints, filmed)
 
 
 CATALOGUE = (

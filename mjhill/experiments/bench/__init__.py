@@ -1,0 +1,1 @@
+"""The bench: a joint set up, held, driven and read."""

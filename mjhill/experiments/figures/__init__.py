@@ -1,0 +1,1 @@
+"""The figures of experiments, in the form of the paper's."""

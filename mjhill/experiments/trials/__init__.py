@@ -1,0 +1,1 @@
+"""Single trials on the bench, each with what is measured of it."""
