@@ -42,4 +42,4 @@ def test_the_wheel_alone_runs_the_elbow(tmp_path):
 def test_every_example_runs_and_prints_a_number_with_its_unit():
     for example in sorted((ROOT / "examples").glob("*.py")):
         output = run(sys.executable, str(example))
-        assert any(unit in output for unit in ("°", " N", " mm")), example
+        assert any(unit in output for unit in ("°", " N", " mm", " ms", " rad")), example

@@ -303,7 +303,7 @@ def test_the_catalogue_has_the_joints_it_names_and_each_experiment_once():
     assert len({entry.id for entry in CATALOGUE}) == len(CATALOGUE)
     for part in select(CATALOGUE):
         assert part.joint in mjhill.JOINTS
-        assert part.entry.path == f"mjhill.experiments.{part.entry.id}:{part.entry.id}"
+        assert part.entry.path == f"mjhill.experiments.paper.{part.entry.id}:{part.entry.id}"
 
 
 def test_joints_asked_for_replace_those_of_each_experiment():

@@ -28,6 +28,9 @@ class Row:
         magnitude: MAG, how far the step goes [rad].
         time_constants: T1 and T2 [s], corrected.
         printed: T1 and T2 [s], as printed.
+        stiffness: K of the fit [N·m/rad], as printed.
+        damping: B of the fit [N·m·s/rad], as printed.
+        gain: K MAG over input and maximum torque [-], as printed; what it is was inferred.
         note: What is wrong with the printed ones; empty where nothing is.
     """
 
@@ -38,6 +41,9 @@ class Row:
     magnitude: float
     time_constants: tuple[float, float]
     printed: tuple[float, float]
+    stiffness: float
+    damping: float
+    gain: float
     note: str
 
 
@@ -66,5 +72,8 @@ def _row(cells: dict[str, str]) -> Row:
         radians(float(cells["MAG_deg"])),
         seconds("T1_ms_corrected", "T2_ms_corrected"),
         seconds("T1_ms", "T2_ms"),
+        float(cells["K"]),
+        float(cells["B"]),
+        float(cells["gain"]),
         cells["note"],
     )

@@ -97,17 +97,18 @@ class ExternalImpulse(Result):
     def claims(self) -> Iterator[Claim]:
         """The five claims of the section."""
         yield self._claim(
-            "The response to an impulse depends strongly on co-contraction: it falls as that rises",
+            "The response to an impulse depends strongly on co-contraction: "
+            "it falls as that rises.",
             falls(self.small),
             "peaks " + at(self.small, lambda s: f"{degrees(s.peak):.2f}°"),
         )
         yield self._claim(
-            "Stiffness and viscosity of the response rise with co-contraction",
+            "Stiffness and viscosity of the response rise with co-contraction.",
             stiffens(self.small),
             at(self.small, impedance),
         )
         yield self._claim(
-            "A larger impulse gives a similar picture",
+            "A larger impulse gives a similar picture.",
             falls(self.large) and stiffens(self.large),
             f"{self.large[0].impulse / self.small[0].impulse:.3g} times the impulse: peaks "
             + at(self.large, lambda s: f"{degrees(s.peak):.2f}°")
@@ -118,7 +119,7 @@ class ExternalImpulse(Result):
         steep, flat = rises(self.small), rises(self.linear)
         yield self._claim(
             "The cause is the nonlinearity of series and contractile element: linear ones show no "
-            "such effect, as their stiffness does not depend on the operating range",
+            "such effect, as their stiffness does not depend on the operating range.",
             all(map(shrinks, steep, flat)),
             f"from the lowest to the highest level K rises by a factor of {steep[0]:.3g} and B by "
             f"{steep[1]:.3g}; with linear elements by {flat[0]:.3g} and {flat[1]:.3g}",

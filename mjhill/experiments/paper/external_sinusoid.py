@@ -83,7 +83,7 @@ class ExternalSinusoid(Result):
 
     def claims(self) -> Iterator[Claim]:
         """The three claims of the section."""
-        what = "the gain at low frequencies falls and the resonance frequency rises"
+        what = "the gain at low frequencies falls and the resonance frequency rises."
         yield self._stiffens(f"With increasing bias torque {what}", self.bias)
         yield self._stiffens(f"With increasing voluntary resistance {what}", self.cocontraction)
         yield self._differs()
@@ -110,7 +110,7 @@ class ExternalSinusoid(Result):
         )
 
     def _differs(self) -> Claim:
-        sentence = "The response to an external oscillation differs from that to a neural one"
+        sentence = "The response to an external oscillation differs from that to a neural one."
         if self.neural is None:
             return Claim(sentence, self.section, None, "no co-contraction is held")
         external = self.cocontraction[len(self.cocontraction) // 2]

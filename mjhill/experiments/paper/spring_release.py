@@ -97,7 +97,7 @@ class SpringRelease(Result):
         which = ", ".join(f"{one.spring:.3g} N·m/rad at {one.level:g}" for one in over)
         yield Claim(
             "Responses under a variety of loads are approximated well as those of an underdamped "
-            "second-order system",
+            "second-order system.",
             self.section,
             not over and max(misfits) <= _CLOSE,
             f"damping ratios {min(found, default=np.nan):.2f} to {max(found, default=np.nan):.2f}, "
@@ -108,7 +108,7 @@ class SpringRelease(Result):
         )
         rising = all(_rises(releases) for releases in self.by_spring().values())
         yield Claim(
-            "Stiffness and viscosity of the joint are strong functions of co-contraction",
+            "Stiffness and viscosity of the joint are strong functions of co-contraction.",
             "4.3.1, Fig. 10b",
             rising if len(self.levels) > 1 else None,
             f"at co-contraction {_list(self.levels)}: "

@@ -68,7 +68,7 @@ class Burst:
     def claim(self) -> Claim:
         """Whether torque follows input."""
         return Claim(
-            "The muscles' torques do not follow transients of their neural inputs",
+            "The muscles' torques do not follow transients of their neural inputs.",
             "4.3.1, Fig. 9c",
             self.correlation < _FOLLOWS and max(self.before, self.other) > _MOVES,
             f"{1e3 * self.width:.0f} ms of input and the torque of {self.muscle} correlate with "

@@ -73,9 +73,11 @@ class StepFit:
             yield Measure(f"{self.name}: {name}", value, unit, span, source, note)
         values = (self.stiffness, self.damping, self.gain)
         units = (("K", "N·m/rad"), ("B", "N·m·s/rad"), ("gain", "-"))
-        for (name, unit), value in zip(units, values, strict=True):
+        printed = (row.stiffness, row.damping, row.gain) if row else [None] * len(values)
+        for (name, unit), value, wanted in zip(units, values, printed, strict=True):
+            span = None if wanted is None else (wanted, wanted)
             seen = None if self.doubt else value
-            yield Measure(f"{self.name}: {name}", seen, unit, note=self.doubt)
+            yield Measure(f"{self.name}: {name}", seen, unit, span, source, self.doubt)
         yield Measure(f"{self.name}: left by the fit", 100 * fit.misfit, "% of MAG")
 
 

@@ -1,0 +1,41 @@
+"""What the paper says, borne out by the elbow with the parameters that come with mjhill."""
+
+import pytest
+
+from mjhill import experiments
+
+CLAIMS = {
+    "free_pulse": ["Superposition does not hold", "does not halve the times"],
+    "neural_sinusoid": ["only below about 2 to 5 Hz", "depends on the amplitude"],
+    "isovelocity": [
+        "differ from the contractile element's own",
+        "series element is the main cause",
+    ],
+    "isotonic": ["can be approximated once the dynamics of the limb are subtracted"],
+    "step": ["faster at a higher input", "does not grow in proportion", "K and viscosity B"],
+    "external_impulse": ["rise with co-contraction", "do not follow transients", "nonlinearity"],
+    "spring_release": ["strong functions of co-contraction"],
+    "external_sinusoid": ["bias torque the gain at low frequencies falls and the resonance"],
+    "lengthening": ["plateau 30 % above isometric"],
+    "tetanus": ["overdamped second-order", "electrical stimulation"],
+}
+
+
+@pytest.mark.parametrize("experiment", CLAIMS)
+def test_the_elbow_bears_out_the_paper(experiment):
+    claims = list(getattr(experiments, experiment)("elbow").claims())
+    for words in CLAIMS[experiment]:
+        (claim,) = [claim for claim in claims if words in claim.sentence]
+        assert claim.holds, claim.evidence
+        assert any(character.isdigit() for character in claim.evidence)
+
+
+@pytest.mark.parametrize("experiment", experiments.NAMES)
+def test_every_experiment_refuses_a_joint_that_does_not_exist(experiment):
+    with pytest.raises(ValueError, match="unknown joint 'toe'; there are: elbow"):
+        getattr(experiments, experiment)("toe")
+
+
+def test_an_experiment_that_does_not_exist_is_refused_with_those_that_do():
+    with pytest.raises(AttributeError, match="no experiment 'sneeze'; there are: twitch"):
+        experiments.sneeze  # noqa: B018
