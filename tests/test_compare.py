@@ -71,6 +71,8 @@ def test_the_second_order_fit_finds_the_spring_and_damper_of_a_simulated_joint()
     # MuJoCo's half step is what is left
     assert fit.stiffness == pytest.approx(30.0, rel=0.01)
     assert fit.damping == pytest.approx(1.5, rel=0.01)
+    free = responses.second_order_fit(run.time, angle, velocity, load, inertia=None)
+    assert free == pytest.approx((30.0, 1.5, 0.06), rel=0.02)
     assert trials.inertia(model, 0.3) == pytest.approx(0.06)
 
 

@@ -13,8 +13,8 @@ def swung(stiffness, damping, inertia=0.1, width=0.02, duration=2.0):
     step = 5e-4
     time = np.arange(round(duration / step) + 1) * step
     load = np.where(time < width - 0.5 * step, 1.0, 0.0)
-    fit = SecondOrder(stiffness, damping)
-    deflection = second_order_response(fit, inertia, time, load)
+    fit = SecondOrder(stiffness, damping, inertia)
+    deflection = second_order_response(fit, time, load)
     _, velocity, _ = lsim(([1.0, 0.0], [inertia, damping, stiffness]), load, time, interp=False)
     return first_swing(time, deflection, velocity, load, inertia)
 
@@ -24,6 +24,7 @@ def test_a_second_order_system_is_found_again(stiffness, damping):
     swing = swung(stiffness, damping)
     assert swing.stiffness == pytest.approx(stiffness, rel=0.01)
     assert swing.damping == pytest.approx(damping, rel=0.01)
+    assert swing.found_inertia == pytest.approx(0.1, rel=0.01)
     assert swing.misfit < 0.005
     assert swing.natural_frequency == pytest.approx(
         np.sqrt(stiffness / 0.1) / (2 * np.pi), rel=0.01

@@ -20,10 +20,12 @@ class SecondOrder(NamedTuple):
     Attributes:
         stiffness: [N·m/rad or N/m].
         damping: [N·m·s/rad or N·s/m].
+        inertia: J [kg·m² or kg], as given or as found.
     """
 
     stiffness: float
     damping: float
+    inertia: float
 
 
 def time_to(time: _Values, values: _Values, level: float) -> float | None:
@@ -75,7 +77,7 @@ def half_life(time: _Values, values: _Values) -> float | None:
 
 
 def second_order_fit(
-    time: _Values, deflection: _Values, velocity: _Values, load: _Values, inertia: float
+    time: _Values, deflection: _Values, velocity: _Values, load: _Values, inertia: float | None
 ) -> SecondOrder:
     """Stiffness and damping that best explain a deflection under a load.
 
@@ -87,12 +89,16 @@ def second_order_fit(
         deflection: q, 0 at the start [rad or m].
         velocity: q' [rad/s or m/s].
         load: What is added to the steady load; held from each sample to the next [N·m or N].
-        inertia: J [kg·m² or kg].
+        inertia: J [kg·m² or kg]; None to find it too.
     """
     step = np.diff(time)
     area = np.concatenate([[0.0], np.cumsum(0.5 * step * (deflection[1:] + deflection[:-1]))])
     impulse = np.concatenate([[0.0], np.cumsum(step * load[:-1])])
-    unknowns = np.stack([area, deflection], axis=1)
-    known = impulse - inertia * (velocity - velocity[0])
-    (stiffness, damping), *_ = np.linalg.lstsq(unknowns, known, rcond=None)
-    return SecondOrder(float(stiffness), float(damping))
+    gained = velocity - velocity[0]
+    if inertia is None:
+        unknowns, known = np.stack([area, deflection, gained], axis=1), impulse
+    else:
+        unknowns, known = np.stack([area, deflection], axis=1), impulse - inertia * gained
+    found, *_ = np.linalg.lstsq(unknowns, known, rcond=None)
+    stiffness, damping, *rest = found.tolist()
+    return SecondOrder(stiffness, damping, rest[0] if inertia is None else inertia)

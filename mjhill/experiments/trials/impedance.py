@@ -8,7 +8,6 @@ from math import radians, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lsim
 
 from mjhill.comparison.responses import SecondOrder, second_order_fit
 from mjhill.experiments.bench.rig import (
@@ -20,6 +19,7 @@ from mjhill.experiments.bench.rig import (
     run,
     still,
 )
+from mjhill.experiments.trials.swing import second_order_response
 from mjhill.parameters import Joint
 from mjhill.recording import Recording
 from mjhill.reference import plant_torque
@@ -83,7 +83,7 @@ def held_impedance(joint: Joint, muscle: str, *, share: float, angle: float) -> 
             f"with {muscle} at {share:g} the joint yields instead of coming back: the fitted "
             f"stiffness is {fit.stiffness:.3g} N·m/rad"
         )
-    explained = _explained(fit, joint.inertia, time, deflection, applied)
+    explained = _explained(fit, time, deflection, applied)
     if explained < _EXPLAINED:
         raise UnmeasuredError(
             f"with {muscle} at {share:g} a second-order system accounts for only "
@@ -128,12 +128,10 @@ def _hit_by_a_degree(
 
 def _explained(
     fit: SecondOrder,
-    inertia: float,
     time: NDArray[np.float64],
     deflection: NDArray[np.float64],
     load: NDArray[np.float64],
 ) -> float:
     """Share of a deflection's variance that the fitted system accounts for under the load."""
-    system = ([1.0], [inertia, fit.damping, fit.stiffness])
-    _, fitted, *_ = lsim(system, load, time, interp=False)
+    fitted = second_order_response(fit, time, load)
     return float(1.0 - np.var(deflection - fitted) / np.var(deflection))

@@ -31,6 +31,7 @@ class Swing:
         time_to_peak: From the start; None where it does not turn [s].
         stiffness: K [N·m/rad].
         damping: B [N·m·s/rad].
+        found_inertia: J that the same fit finds where it is not told [kg·m²].
         window: Length of what is fitted [s].
         misfit: Root mean square of what the fit leaves in that window, as a share of the peak [-].
         misfit_of_run: The same over the whole run [-].
@@ -41,6 +42,7 @@ class Swing:
     time_to_peak: float | None
     stiffness: float
     damping: float
+    found_inertia: float
     window: float
     misfit: float
     misfit_of_run: float
@@ -82,25 +84,25 @@ def first_swing(
     peak = float(deflection[:end].max())
     if window is not None:
         end = min(round(window / (time[1] - time[0])) + 1, len(time))
-    fit = second_order_fit(time[:end], deflection[:end], velocity[:end], load[:end], inertia)
-    left = deflection - second_order_response(fit, inertia, time, load)
+    series = (time[:end], deflection[:end], velocity[:end], load[:end])
+    fit, free = second_order_fit(*series, inertia), second_order_fit(*series, None)
+    left = deflection - second_order_response(fit, time, load)
     return Swing(
         inertia=inertia,
         peak=peak,
         time_to_peak=None if turned is None else float(time[turned] - time[0]),
         stiffness=fit.stiffness,
         damping=fit.damping,
+        found_inertia=free.inertia,
         window=float(time[end - 1] - time[0]),
         misfit=float(np.sqrt(np.mean(left[:end] ** 2)) / peak),
         misfit_of_run=float(np.sqrt(np.mean(left**2)) / peak),
     )
 
 
-def second_order_response(
-    fit: SecondOrder, inertia: float, time: _Values, load: _Values
-) -> _Values:
+def second_order_response(fit: SecondOrder, time: _Values, load: _Values) -> _Values:
     """Deflection [rad] of a second-order system under a load held over each step, from rest."""
-    system = ([1.0], [inertia, fit.damping, fit.stiffness])
+    system = ([1.0], [fit.inertia, fit.damping, fit.stiffness])
     _, fitted, *_ = lsim(system, load, time - time[0], interp=False)
     return np.asarray(fitted)
 
@@ -112,6 +114,7 @@ def swing_measures(label: str, swing: Swing) -> Iterator[Measure]:
     yield Measure(f"time to peak, {label}", swing.time_to_peak, "s", note=unturned)
     yield Measure(f"stiffness K, {label}", swing.stiffness, "N·m/rad")
     yield Measure(f"viscosity B, {label}", swing.damping, "N·m·s/rad")
+    yield Measure(f"inertia J, found, {label}", swing.found_inertia, "kg·m²")
     yields = "" if swing.stiffness > 0 else "the fitted stiffness is not positive"
     yield Measure(f"natural frequency, {label}", swing.natural_frequency, "Hz", note=yields)
     yield Measure(f"damping ratio, {label}", swing.damping_ratio, "-", note=yields)
