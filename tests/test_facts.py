@@ -3,8 +3,10 @@
 from dataclasses import replace
 from math import radians
 
+import made_joint
 import numpy as np
 import pytest
+from made_joint import MUSCLE
 
 import mjhill
 from mjhill.experiments.bench.rig import (
@@ -24,18 +26,6 @@ from mjhill.experiments.trials.turn import turn
 from mjhill.identification.facts import Fact, facts, read_entries
 from mjhill.reference import plant_torque
 
-MUSCLE = mjhill.Muscle(
-    max_isometric_force=10.0,
-    optimal_length=0.0,
-    width_short=1.2,
-    width_long=1.2,
-    max_velocity=15.0,
-    hill_shape=0.3,
-    series_stretch=0.2,
-    excitation_tau=0.03,
-    activation_tau=0.01,
-    deactivation_tau=0.04,
-)
 NO_ELASTICITY = mjhill.Passive(k1_pos=0.0, k2_pos=1.0, k1_neg=0.0, k2_neg=1.0)
 
 ENTRY = """
@@ -52,20 +42,7 @@ source = "none"
 
 
 def make_joint(muscle: mjhill.Muscle = MUSCLE, **changes) -> mjhill.Joint:
-    values = {
-        "name": "joint",
-        "positive": "right",
-        "inertia": 0.01,
-        "damping": 0.05,
-        "stiffness": 1.0,
-        "rest_angle": 0.0,
-        "passive": NO_ELASTICITY,
-        "range": (-1.2, 1.2),
-        "home_angle": 0.0,
-        "muscles": {"puller": muscle, "opponent": muscle},
-        "gears": {"puller": -1.0, "opponent": 1.0},
-    }
-    return mjhill.Joint(**{**values, **changes})
+    return made_joint.make_joint(muscle, **{"passive": NO_ELASTICITY, **changes})
 
 
 def turn_of(joint, degrees, braked):
