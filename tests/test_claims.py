@@ -5,6 +5,7 @@ import pytest
 from mjhill import experiments
 
 CLAIMS = {
+    "synergists": ["sums the individual torques", "stronger muscles weigh more", "stand for"],
     "free_pulse": ["Superposition does not hold", "does not halve the times"],
     "neural_sinusoid": ["only below about 2 to 5 Hz", "depends on the amplitude"],
     "isovelocity": [

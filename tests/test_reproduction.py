@@ -306,6 +306,12 @@ def test_the_catalogue_has_the_joints_it_names_and_each_experiment_once():
         assert part.entry.path == f"mjhill.experiments.paper.{part.entry.id}:{part.entry.id}"
 
 
+def test_an_experiment_that_needs_its_own_joints_is_left_out_or_refused_on_others():
+    assert all(part.entry.id != "synergists" for part in select(CATALOGUE, joints=["knee"]))
+    with pytest.raises(ValueError, match="synergists can be made on elbow only"):
+        select(CATALOGUE, ["synergists"], ["knee"])
+
+
 def test_joints_asked_for_replace_those_of_each_experiment():
     parts = select(CATALOGUE, ["step", "twitch"], ["hip", "eye", "hip"])
     assert [part.name for part in parts] == ["twitch-hip", "twitch-eye", "step-hip", "step-eye"]

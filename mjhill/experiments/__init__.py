@@ -21,10 +21,12 @@ if TYPE_CHECKING:
     from mjhill.experiments.paper.neural_sinusoid import neural_sinusoid as neural_sinusoid
     from mjhill.experiments.paper.spring_release import spring_release as spring_release
     from mjhill.experiments.paper.step import step as step
+    from mjhill.experiments.paper.synergists import synergists as synergists
     from mjhill.experiments.paper.tetanus import tetanus as tetanus
     from mjhill.experiments.paper.twitch import twitch as twitch
 
 NAMES = (
+    "synergists",
     "twitch",
     "tetanus",
     "isovelocity",

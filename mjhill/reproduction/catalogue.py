@@ -21,12 +21,14 @@ class Entry:
         path: Its function, as ``module:name``; the module is imported when it is run.
         joints: The joints that it is made on where none are asked for.
         filmed: Whether its run is worth a video.
+        anywhere: Whether it can be made on other joints too.
     """
 
     id: str
     path: str
     joints: tuple[str, ...]
     filmed: bool = False
+    anywhere: bool = True
 
     @property
     def module(self) -> str:
@@ -64,11 +66,12 @@ class Part:
         return f"mjhill reproduce --only {self.entry.id} --joint {self.joint}"
 
 
-def _entry(name: str, *joints: str, filmed: bool = False) -> Entry:
-    return Entry(name, f"mjhill.experiments.paper.{name}:{name}", joints, filmed)
+def _entry(name: str, *joints: str, filmed: bool = False, anywhere: bool = True) -> Entry:
+    return Entry(name, f"mjhill.experiments.paper.{name}:{name}", joints, filmed, anywhere)
 
 
 CATALOGUE = (
+    _entry("synergists", "elbow", anywhere=False),
     _entry("twitch", "ankle"),
     # the four flexion-extension systems of Fig. 5b
     _entry("tetanus", "elbow", "wrist", "knee", "ankle"),
@@ -95,19 +98,24 @@ def select(
         joints: Names of the joints to make each on; each experiment's own without any.
 
     Raises:
-        ValueError: There is no such experiment or joint; the message lists those there are.
+        ValueError: There is no such experiment or joint, or an experiment wanted cannot be made
+            on the joints; the message lists those there are.
     """
     known = [entry.id for entry in catalogue]
     for kind, asked, there in (("experiment", only, known), ("joint", joints, list(JOINTS))):
         for name in asked:
             if name not in there:
                 raise ValueError(f"unknown {kind} {name!r}; there are: {', '.join(there)}")
-    return [
-        Part(entry, joint)
-        for entry in catalogue
-        if not only or entry.id in only
-        for joint in dict.fromkeys(joints or entry.joints)
-    ]
+    chosen = [entry for entry in catalogue if not only or entry.id in only]
+    for entry in chosen:
+        if only and joints and not _joints(entry, joints):
+            raise ValueError(f"{entry.id} can be made on {', '.join(entry.joints)} only")
+    return [Part(entry, joint) for entry in chosen for joint in _joints(entry, joints)]
+
+
+def _joints(entry: Entry, asked: Sequence[str]) -> list[str]:
+    wanted = dict.fromkeys(asked or entry.joints)
+    return [joint for joint in wanted if entry.anywhere or joint in entry.joints]
 
 
 def every_part(catalogue: Sequence[Entry]) -> list[Part]:
