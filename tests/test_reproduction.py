@@ -320,7 +320,7 @@ def test_joints_asked_for_replace_those_of_each_experiment():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--only", "dance"), "unknown experiment 'dance'; there are: twitch, tetanus"),
+        (("--only", "dance"), "unknown experiment 'dance'; there are: synergists, twitch"),
         (("--joint", "wing"), "unknown joint 'wing'; there are: elbow"),
     ],
 )
