@@ -20,8 +20,3 @@ def tidy(axes: Any) -> None:
 def legend_above(figure: Any, handles: Any, columns: int = 4) -> None:
     """One legend for the whole figure, above it, where no data are."""
     figure.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False)
-
-
-def spoken(muscle: str) -> str:
-    """The name of a muscle in words."""
-    return muscle.replace("_", " ")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mjhill.experiments.result import spoken
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def _burst(upper: Any, lower: Any, result: ExternalImpulse) -> None:
     burst, time = result.burst, 1e3 * result.burst.run.time
     names = [name.removesuffix(".u") for name in burst.run if name.endswith(".u")]
     for name, colour in zip(names, MUSCLE_COLOURS, strict=False):
-        upper.plot(time, burst.run[f"{name}.u"], color=colour, label=name.replace("_", " "))
+        upper.plot(time, burst.run[f"{name}.u"], color=colour, label=spoken(name))
         lower.plot(time, burst.without[f"{name}.force"], color=colour, ls="--", lw=1)
         lower.plot(time, burst.run[f"{name}.force"], color=colour)
     upper.set_title("c  a burst of input during the response", fontsize=10)

@@ -8,6 +8,7 @@ import numpy as np
 
 from mjhill.experiments.bench.frequency import decibel
 from mjhill.experiments.figures.external_impulse import shades, tidy
+from mjhill.experiments.result import spoken
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 
 if TYPE_CHECKING:
@@ -19,8 +20,7 @@ _ROWS = ("gain [dB re 1 rad/(N·m)]", "phase [°]", "coherence [-]")
 def draw(result: ExternalSinusoid, figure: Any) -> None:
     """Draw the result into a Matplotlib figure."""
     grid = figure.subplots(3, 2, sharex=True, sharey="row", height_ratios=(2, 1.6, 1))
-    muscle = result.muscle.replace("_", " ")
-    _column(grid[:, 0], result.bias, f"bias held by the {muscle}")
+    _column(grid[:, 0], result.bias, f"bias held by the {spoken(result.muscle)}")
     _column(grid[:, 1], result.cocontraction, "co-contraction")
     if result.neural is not None:
         _neural(grid[:, 1], result)

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mjhill.experiments.figures.drawing import spoken, tidy, torque_unit
+from mjhill.experiments.figures.drawing import tidy, torque_unit
+from mjhill.experiments.result import spoken
 from mjhill.experiments.trials.stretch import Stretch
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 

@@ -92,7 +92,7 @@ class ExternalImpulse(Result):
             yield Measure(f"viscosity B, {label}", hit.swing.damping, "N·m·s/rad")
         yield from self.burst.measures()
         for one in self.unheld:
-            yield Measure(f"response at {one.label}", None, "rad", note=one.reason)
+            yield Measure(f"response at {one.label}", None, "°", note=one.reason)
 
     def claims(self) -> Iterator[Claim]:
         """The five claims of the section."""

@@ -75,11 +75,11 @@ class ExternalSinusoid(Result):
         for curve in (*self.bias, *self.cocontraction):
             label, low = curve.drive.label, curve.frequency[0]
             note = "" if curve.resonance else "not within the band"
-            yield Measure(f"gain at {low:.3g} Hz, {label}", curve.low_gain, "rad/(N·m)")
+            yield Measure(f"gain at {low:.3g} Hz, {label}", degrees(curve.low_gain), "°/(N·m)")
             yield Measure(f"resonance, {label}", curve.resonance, "Hz", note=note)
             yield Measure(f"least coherence, {label}", float(curve.coherence.min()), "-")
         for one in self.unheld:
-            yield Measure(f"response under {one.label}", None, "rad/(N·m)", note=one.reason)
+            yield Measure(f"response under {one.label}", None, "°/(N·m)", note=one.reason)
 
     def claims(self) -> Iterator[Claim]:
         """The three claims of the section."""
@@ -104,7 +104,7 @@ class ExternalSinusoid(Result):
             self.section,
             None if undecided else falls and rises,
             "; ".join(
-                f"{curve.drive.label}: {curve.low_gain:.3g} rad/(N·m), resonance {resonance}"
+                f"{curve.drive.label}: {degrees(curve.low_gain):.3g}°/(N·m), resonance {resonance}"
                 for curve, resonance in zip(curves, shown, strict=True)
             ),
         )

@@ -84,7 +84,7 @@ class SpringRelease(Result):
             yield Measure(f"stiffness of the joint alone, {label}", one.stiffness, "N·m/rad")
             yield from swing_measures(f"joint and spring, {label}", one.swing)
         for unheld in self.unheld:
-            yield Measure(f"release at {unheld.label}", None, "rad", note=unheld.reason)
+            yield Measure(f"release at {unheld.label}", None, "°", note=unheld.reason)
 
     def claims(self) -> Iterator[Claim]:
         """The two claims of the section."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mjhill.comparison.responses import settling_time
 from mjhill.experiments.bench.rig import as_joint, rig, run, still
-from mjhill.experiments.result import Claim, Measure, Result
+from mjhill.experiments.result import Claim, Measure, Result, spoken
 from mjhill.experiments.trials.proportion import (
     AS_IT_IS,
     FLAT,
@@ -130,7 +130,7 @@ class Step(Result):
         for axis, muscle, colour in zip(axes, muscles, MUSCLE_COLOURS, strict=False):
             for step in (step for step in self.steps if step.muscle == muscle):
                 self._draw_step(axis, step, colour)
-            axis.set_title(muscle.replace("_", " "), fontsize="medium")
+            axis.set_title(spoken(muscle), fontsize="medium")
             axis.set_xlabel("time [s]")
             axis.set_xlim(0, self.time[-1])
             axis.grid(alpha=0.3)

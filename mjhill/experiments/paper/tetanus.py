@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from mjhill.experiments.bench.dynamometry import active_torque, stiff_machine, stimulated
 from mjhill.experiments.bench.rig import as_joint, rig
-from mjhill.experiments.figures.drawing import legend_above, spoken, tidy
-from mjhill.experiments.result import Claim, Measure, Result
+from mjhill.experiments.figures.drawing import legend_above, tidy
+from mjhill.experiments.result import Claim, Measure, Result, spoken
 from mjhill.identification.second_order import SecondOrderStep, fit_step, step_response
 from mjhill.parameters import Joint
 from mjhill.rendering.bellies import MUSCLE_COLOURS
