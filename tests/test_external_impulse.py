@@ -61,6 +61,11 @@ def test_claims_follow_from_the_hits(elbow):
     assert [claim.holds for claim in claims] == [True] * 5
     reversed_levels = replace(elbow, small=elbow.small[::-1], large=elbow.large[::-1])
     assert [claim.holds for claim in reversed_levels.claims()][:3] == [False] * 3
+    alike = tuple(
+        replace(hit, swing=replace(hit.swing, peak=0.05 - 0.001 * k))
+        for k, hit in enumerate(elbow.small)
+    )
+    assert next(replace(elbow, small=alike).claims()).holds is False
     assert list(replace(elbow, linear=elbow.small).claims())[4].holds is False
 
 

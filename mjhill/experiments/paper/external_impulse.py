@@ -38,6 +38,7 @@ from mjhill.experiments.trials.hit import (
     rises,
     shrinks,
     stiffens,
+    strongly_rises,
 )
 from mjhill.experiments.trials.neural_burst import Burst, hit_with_burst
 from mjhill.experiments.trials.swing import swing_measures
@@ -98,8 +99,8 @@ class ExternalImpulse(Result):
         """The five claims of the section."""
         yield self._claim(
             "The response to an impulse depends strongly on co-contraction: "
-            "it falls as that rises.",
-            falls(self.small),
+            "it falls as that rises (here: to half or less).",
+            strongly_rises([1 / hit.swing.peak for hit in self.small]),
             "peaks " + at(self.small, lambda s: f"{degrees(s.peak):.2f}°"),
         )
         yield self._claim(

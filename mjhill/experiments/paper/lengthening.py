@@ -60,7 +60,9 @@ class Lengthening(Result):
             at = f"{self.muscle} at {one.level:g}, stretched at {degrees(one.velocity):.0f}°/s"
             yield Measure(f"{at}, torque at its end", one.end, "-", note="of isometric torque")
             back = one.recovery(_LASTING)
-            yield Measure(f"{at}, back to within 1 % of isometric after", 1e3 * back, "ms")
+            after = None if back is None else 1e3 * back
+            note = "" if after is not None else f"not within {AFTER:g} s"
+            yield Measure(f"{at}, back to within 1 % of isometric after", after, "ms", note=note)
             yield Measure(f"{at}, above isometric {AFTER:g} s later", 1e2 * one.residual, "%")
         yield Measure("stretch", degrees(abs(self.end - self.start)), "°")
         yield Measure("stiffness of the dynamometer", self.stiffness, "N·m/rad")
@@ -77,13 +79,15 @@ class Lengthening(Result):
             f"isometric (at {worst.level:g}, {degrees(worst.velocity):.0f}°/s)",
         )
         last = max(self._all(), key=lambda one: abs(one.residual))
-        slowest = max(one.recovery(_LASTING) for one in self._all())
+        times = [one.recovery(_LASTING) for one in self._all()]
+        seen = [time for time in times if time is not None]
+        back = f"at most {1e3 * max(seen):.0f} ms" if len(seen) == len(times) else "not always"
         yield Claim(
             "Nor does it keep extra force after a stretch, as real muscle does.",
             "5",
             abs(last.residual) < _LASTING,
-            f"back to within 1 % of isometric after at most {1e3 * slowest:.0f} ms; {AFTER:g} s "
-            f"after the stretch it is {abs(last.residual):.2%} off at most",
+            f"time to come back to within 1 % of isometric: {back}; {AFTER:g} s after the stretch it is "
+            f"{abs(last.residual):.2%} off at most",
         )
 
     def _plateau(self) -> Claim:

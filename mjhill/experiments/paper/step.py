@@ -92,7 +92,10 @@ class Step(Result):
         yield _claim(
             "That is due primarily to the parallel elasticity (here: more than to the active "
             "torque-angle relation).",
-            [ratios[LINEAR] > ratios[FLAT] for ratios in self.proportion.values()],
+            [
+                ratios[LINEAR] > max(ratios[FLAT], ratios[AS_IT_IS])
+                for ratios in self.proportion.values()
+            ],
             [
                 f"{muscle} from rest: {ratios[AS_IT_IS]:.2f} times as far, {LINEAR} "
                 f"{ratios[LINEAR]:.2f}, {FLAT} {ratios[FLAT]:.2f}"

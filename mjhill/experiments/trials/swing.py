@@ -114,7 +114,9 @@ def swing_measures(label: str, swing: Swing) -> Iterator[Measure]:
     yield Measure(f"time to peak, {label}", swing.time_to_peak, "s", note=unturned)
     yield Measure(f"stiffness K, {label}", swing.stiffness, "N·m/rad")
     yield Measure(f"viscosity B, {label}", swing.damping, "N·m·s/rad")
-    yield Measure(f"inertia J, found, {label}", swing.found_inertia, "kg·m²")
+    found = swing.found_inertia if swing.found_inertia > 0 else None
+    none = "" if found else "the fit that may choose it finds none above 0"
+    yield Measure(f"inertia J, found, {label}", found, "kg·m²", note=none)
     yields = "" if swing.stiffness > 0 else "the fitted stiffness is not positive"
     yield Measure(f"natural frequency, {label}", swing.natural_frequency, "Hz", note=yields)
     yield Measure(f"damping ratio, {label}", swing.damping_ratio, "-", note=yields)
