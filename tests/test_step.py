@@ -7,8 +7,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
+from mjhill.experiments.bench.variants import AS_IT_IS, FLAT, LINEAR
 from mjhill.experiments.paper.step import Step, step
-from mjhill.experiments.trials.proportion import AS_IT_IS, FLAT, LINEAR
 from mjhill.experiments.trials.step_fit import fitted_step
 from mjhill.identification.second_order import step_response
 from mjhill.reference import rest_state, simulate

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.experiments.bench.frequency import SecondOrderFrequency, decibel
+from mjhill.experiments.figures.drawing import every
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 
 _Values = NDArray[np.float64]
@@ -81,7 +82,7 @@ def draw_bode(
                 axis.axvspan(*band, color="0.5", alpha=0.12, lw=0)
     axes[0, 0].set_ylabel(gain_label)
     axes[1, 0].set_ylabel("phase [°]")
-    axes[1, 0].yaxis.set_major_locator(_every(90))
+    axes[1, 0].yaxis.set_major_locator(every(90))
     axes[2, 0].set_ylabel("coherence")
     axes[2, 0].set_ylim(0, 1.1)
 
@@ -105,9 +106,3 @@ def _mark_octaves(axis: Any, frequency: _Values) -> None:
     marks = 2.0 ** np.arange(np.ceil(low - 1e-9), np.floor(high + 1e-9) + 1)
     axis.set_xticks(marks, [f"{mark:g}" for mark in marks])
     axis.xaxis.set_minor_locator(NullLocator())
-
-
-def _every(step: float) -> Any:
-    from matplotlib.ticker import MultipleLocator
-
-    return MultipleLocator(step)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 
 def torque_unit(largest: float) -> tuple[float, str]:
     """Factor from N·m and unit in which torques up to ``largest`` [N·m] are easy to read."""
@@ -15,6 +17,18 @@ def tidy(axes: Any) -> None:
     axes.grid(color="0.9", lw=0.8)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def shades(count: int) -> list[str]:
+    """Greys for ``count`` ascending levels, the highest black."""
+    return [f"{grey:.2f}" for grey in np.linspace(0.72, 0.0, count)] if count > 1 else ["0.0"]
+
+
+def every(step: float) -> Any:
+    """A locator of ticks a step apart."""
+    from matplotlib.ticker import MultipleLocator
+
+    return MultipleLocator(step)
 
 
 def legend_above(figure: Any, handles: Any, columns: int = 4) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mjhill.experiments.figures.drawing import shades, tidy
 from mjhill.experiments.result import spoken
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 
@@ -14,17 +15,6 @@ if TYPE_CHECKING:
     from mjhill.experiments.trials.hit import Hit
 
 _SHOWN = 0.6  # [s]
-
-
-def shades(count: int) -> list[str]:
-    """Greys for ``count`` ascending levels, the highest black."""
-    return [f"{grey:.2f}" for grey in np.linspace(0.72, 0.0, count)] if count > 1 else ["0.0"]
-
-
-def tidy(axes: Any) -> None:
-    """The grid and frame of every plot."""
-    axes.grid(color="0.9", lw=0.8)
-    axes.spines[["top", "right"]].set_visible(False)
 
 
 def draw(result: ExternalImpulse, figure: Any) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjhill.experiments.bench.frequency import decibel
-from mjhill.experiments.figures.external_impulse import shades, tidy
+from mjhill.experiments.figures.drawing import every, shades, tidy
 from mjhill.experiments.result import spoken
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 
@@ -31,7 +31,7 @@ def draw(result: ExternalSinusoid, figure: Any) -> None:
     for axes in grid[0]:
         if axes.lines:
             axes.legend(frameon=False, fontsize=8, loc="lower left")
-    grid[1, 0].yaxis.set_major_locator(_locator(90))
+    grid[1, 0].yaxis.set_major_locator(every(90))
     grid[2, 0].set_ylim(0, 1.05)
     figure.align_ylabels(grid)
 
@@ -64,9 +64,3 @@ def _lines(column: Any, curve: Any, scale: float = 1.0, **style: Any) -> None:
     column[0].plot(curve.frequency[heard], decibel(scale * curve.gain[heard]), **style)
     column[1].plot(curve.frequency[heard], np.degrees(curve.phase[heard]), **style)
     column[2].plot(curve.frequency, curve.coherence, **style)
-
-
-def _locator(step: float) -> Any:
-    from matplotlib.ticker import MultipleLocator
-
-    return MultipleLocator(step)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjhill.experiments.figures.external_impulse import shades, tidy
+from mjhill.experiments.figures.drawing import shades, tidy
 from mjhill.experiments.result import spoken
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 

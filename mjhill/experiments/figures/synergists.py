@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mjhill.equivalent import stretch_at_force, torque_at_velocity
+from mjhill.experiments.figures.drawing import tidy
 from mjhill.parameters import Muscle
 
 # blue, orange, green, purple of Okabe & Ito 2008; dashes where heads hide one another
@@ -43,8 +44,7 @@ def draw(heads: Mapping[str, Muscle], equivalent: Muscle, figure: Any) -> None:
     stretch_axis.set_title("(b) series elements")
     stretch_axis.set_xlabel("stretch [°]")
     for axis in (speed_axis, stretch_axis):
-        axis.grid(color="0.9", linewidth=0.8)
-        axis.spines[["top", "right"]].set_visible(False)
+        tidy(axis)
         axis.set(xlim=(0, None), ylim=(0, None))
     spacing = {"columnspacing": 1.2, "handlelength": 1.5, "handletextpad": 0.5}
     figure.legend(loc="outside lower center", ncols=5, frameon=False, **spacing)

@@ -31,7 +31,7 @@ from mjhill.experiments.bench.posture import (
     static_stiffness,
     steadiest,
 )
-from mjhill.experiments.bench.rig import as_joint, rig
+from mjhill.experiments.bench.rig import UnmeasuredError, as_joint, as_muscle, rig
 from mjhill.experiments.figures.external_sinusoid import draw
 from mjhill.experiments.result import Claim, Measure, Result
 from mjhill.experiments.trials.sinusoids import Curve, shaken
@@ -163,12 +163,10 @@ def external_sinusoid(
 
     Raises:
         ValueError: The joint or the muscle is unknown or an option is out of range.
-        UnmeasuredError: The joint stays in none of the conditions.
+        UnmeasuredError: The joint stays in none of the conditions, or not where it is relaxed.
     """
     joint = as_joint(joint)
-    muscle = next(iter(joint.muscles)) if muscle is None else muscle
-    if muscle not in joint.muscles:
-        raise ValueError(f"unknown muscle {muscle!r}; there are: {', '.join(joint.muscles)}")
+    muscle = as_muscle(joint, muscle)
     shares = check_ascending("shares", shares, -1e-9, 1.0)
     levels = check_ascending("levels", levels, 0.0, 1.0)
     check_angle(joint, angle)
@@ -178,6 +176,8 @@ def external_sinusoid(
     if angle is None:
         angle = steadiest(joint, [condition for _, condition in (bias | both).values()])
     relaxed = static_stiffness(joint, {}, angle)
+    if relaxed <= 0:
+        raise UnmeasuredError(f"relaxed, {joint.name} drifts away from {degrees(angle):.3g}°")
     frequency = frequencies(joint, band, relaxed)
     held, unheld = held_drives(joint, bias | both, angle, relaxed * deflection)
     drives = list(held.values())

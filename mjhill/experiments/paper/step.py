@@ -17,15 +17,9 @@ from numpy.typing import NDArray
 
 from mjhill.comparison.responses import settling_time
 from mjhill.experiments.bench.rig import as_joint, rig, run, still
+from mjhill.experiments.bench.variants import AS_IT_IS, FLAT, LINEAR
 from mjhill.experiments.result import Claim, Measure, Result, spoken
-from mjhill.experiments.trials.proportion import (
-    AS_IT_IS,
-    FLAT,
-    LINEAR,
-    LONG,
-    proportions,
-    step_responses,
-)
+from mjhill.experiments.trials.proportion import LONG, proportions, step_responses
 from mjhill.experiments.trials.step_fit import StepFit, fitted_step
 from mjhill.identification.evidence import SHAPE_SPREAD
 from mjhill.identification.second_order import step_response
