@@ -28,7 +28,7 @@ class Swept(Protocol):
 
     @property
     def gain(self) -> _Values:
-        """In the output's unit over the drive's."""
+        """Angle over the drive [rad per unit]."""
 
     @property
     def phase(self) -> _Values:
@@ -59,7 +59,7 @@ def draw_bode(
     Args:
         figure: A Matplotlib figure.
         columns: Sweeps by what differs in them.
-        gain_label: Label of the gain's axis, in dB.
+        gain_label: Label of the gain's axis, in dB of a degree.
         band: Frequencies to shade [Hz].
     """
     ratios = {"height_ratios": [3, 3, 1.2]}
@@ -89,13 +89,15 @@ def draw_bode(
 
 def _draw_sweep(gain: Any, phase: Any, coherence: Any, sweep: Swept, colour: Any) -> None:
     frequency = sweep.frequency
-    gain.plot(frequency, decibel(sweep.gain), "o-", ms=3.5, color=colour, label=sweep.name)
+    gain.plot(
+        frequency, decibel(np.degrees(sweep.gain)), "o-", ms=3.5, color=colour, label=sweep.name
+    )
     phase.plot(frequency, np.degrees(sweep.phase), "o-", ms=3.5, color=colour)
     coherence.plot(frequency, sweep.coherence, "o-", ms=2.5, color=colour)
     shown = frequency[frequency <= 2 * sweep.highest]
     if len(shown):
         fitted = sweep.fit.response(shown)
-        gain.plot(shown, decibel(np.abs(fitted)), "--", color=colour, lw=1.2)
+        gain.plot(shown, decibel(np.degrees(np.abs(fitted))), "--", color=colour, lw=1.2)
         phase.plot(shown, np.degrees(np.unwrap(np.angle(fitted))), "--", color=colour, lw=1.2)
 
 

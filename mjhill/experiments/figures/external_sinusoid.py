@@ -14,7 +14,7 @@ from mjhill.rendering.bellies import MUSCLE_COLOURS
 if TYPE_CHECKING:
     from mjhill.experiments.paper.external_sinusoid import ExternalSinusoid
 
-_ROWS = ("gain [dB re 1 rad/(N·m)]", "phase [°]", "coherence [-]")
+_ROWS = ("gain [dB re 1°/(N·m)]", "phase [°]", "coherence [-]")
 
 
 def draw(result: ExternalSinusoid, figure: Any) -> None:
@@ -61,6 +61,6 @@ def _neural(column: Any, result: ExternalSinusoid) -> None:
 
 def _lines(column: Any, curve: Any, scale: float = 1.0, **style: Any) -> None:
     heard = curve.coherence > 0.5  # a fainter response is as much drift as answer
-    column[0].plot(curve.frequency[heard], decibel(scale * curve.gain[heard]), **style)
+    column[0].plot(curve.frequency[heard], decibel(scale * np.degrees(curve.gain[heard])), **style)
     column[1].plot(curve.frequency[heard], np.degrees(curve.phase[heard]), **style)
     column[2].plot(curve.frequency, curve.coherence, **style)

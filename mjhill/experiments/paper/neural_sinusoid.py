@@ -132,7 +132,7 @@ class NeuralSinusoid(Result):
         draw_bode(
             figure,
             {"amplitude": self.amplitudes, "offset": self.offsets},
-            gain_label="gain [dB of 1 rad]",
+            gain_label="gain [dB re 1° per unit input]",
             band=_SECOND_ORDER,
         )
 
