@@ -1,5 +1,8 @@
 """What the paper says, borne out by the elbow with the parameters that come with mjhill."""
 
+import re
+from functools import cache
+
 import pytest
 
 from mjhill import experiments
@@ -22,9 +25,24 @@ CLAIMS = {
 }
 
 
+@cache
+def made(experiment):
+    return getattr(experiments, experiment)("elbow")
+
+
+@pytest.mark.parametrize("experiment", CLAIMS)
+def test_people_read_degrees_and_words(experiment):
+    angles = {"rad", "rad/s", "rad/(N·m)"}
+    for measure in made(experiment).measures():
+        assert measure.unit not in angles, measure
+        assert not re.search("[a-z]_[a-z]", measure.name + measure.note)
+    for claim in made(experiment).claims():
+        assert not re.search(r"[a-z]_[a-z]|\d rad\b|rad/s|\bnan\b|\binf\b", claim.evidence)
+
+
 @pytest.mark.parametrize("experiment", CLAIMS)
 def test_the_elbow_bears_out_the_paper(experiment):
-    claims = list(getattr(experiments, experiment)("elbow").claims())
+    claims = list(made(experiment).claims())
     for words in CLAIMS[experiment]:
         (claim,) = [claim for claim in claims if words in claim.sentence]
         assert claim.holds, claim.evidence

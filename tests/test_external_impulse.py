@@ -16,6 +16,7 @@ from mjhill.experiments.bench.posture import balanced
 from mjhill.experiments.bench.rig import UnmeasuredError
 from mjhill.experiments.paper.external_impulse import external_impulse
 from mjhill.experiments.trials.hit import Hammer
+from mjhill.experiments.trials.neural_burst import hit_with_burst
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +62,11 @@ def test_claims_follow_from_the_hits(elbow):
     assert [claim.holds for claim in claims] == [True] * 5
     reversed_levels = replace(elbow, small=elbow.small[::-1], large=elbow.large[::-1])
     assert [claim.holds for claim in reversed_levels.claims()][:3] == [False] * 3
+    alike = tuple(
+        replace(hit, swing=replace(hit.swing, peak=0.05 - 0.001 * k))
+        for k, hit in enumerate(elbow.small)
+    )
+    assert next(replace(elbow, small=alike).claims()).holds is False
     assert list(replace(elbow, linear=elbow.small).claims())[4].holds is False
 
 
@@ -82,6 +88,13 @@ def test_the_burst_acts_on_the_stretched_muscle_and_only_after_it_starts(elbow):
         burst.run["elbow_flexor.u"][0] + burst.height
     )
     assert burst.delay > 0
+
+
+def test_a_muscle_at_full_input_takes_no_burst(elbow):
+    joint, full = mjhill.JOINTS["elbow"], dict.fromkeys(elbow.levels[0.5], 1.0)
+    hammer = Hammer(elbow.angle, elbow.sign, 0.06, 0.02, 0.5)
+    with pytest.raises(UnmeasuredError, match="input of elbow_flexor is full"):
+        hit_with_burst(hammer, joint, full, impulse=0.1, height=0.3)
 
 
 def test_linear_elements_agree_at_the_inputs_that_they_are_made_for(elbow):

@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 
 import mjhill
 from mjhill.experiments.bench.drives import Drive
-from mjhill.experiments.bench.posture import net_torque
-from mjhill.experiments.bench.rig import UnmeasuredError, muscle_torque, rig
+from mjhill.experiments.bench.rig import UnmeasuredError, muscle_torque, net_torque, rig
 from mjhill.experiments.paper.external_sinusoid import external_sinusoid
 from mjhill.experiments.trials.sinusoids import Curve, shaken
 

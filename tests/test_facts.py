@@ -9,10 +9,10 @@ import pytest
 from made_joint import MUSCLE
 
 import mjhill
+from mjhill.experiments.bench.posture import holding
 from mjhill.experiments.bench.rig import (
     UnmeasuredError,
     angles,
-    holding,
     muscle_torque,
     rig,
     run,

@@ -51,6 +51,19 @@ def test_torque_is_isometric_before_the_stretch_and_long_after_it():
     assert found.recovery(0.01) < 0.2
 
 
+def test_torque_that_does_not_come_back_is_not_said_to():
+    found = lengthening(make_joint(), **ONE)
+    (one,) = found.stretches[1.0]
+    high = replace(one, relative=one.relative + 0.1)
+    assert high.recovery(0.01) is None
+    assert one.recovery(0.01) == pytest.approx(
+        float(one.time[np.abs(one.relative - 1) > 0.01][-1]) - one.stop + 1e-3, abs=1e-9
+    )
+    *_, kept = replace(found, stretches={1.0: (high,)}).claims()
+    assert not kept.holds
+    assert "isometric: not always" in kept.evidence
+
+
 def test_a_longer_series_element_takes_longer_to_come_back():
     times = [
         stretched(make_joint(replace(EVEN, series_stretch=x))).recovery(0.01) for x in (0.1, 0.3)

@@ -97,6 +97,11 @@ def test_bandwidth_is_where_the_gain_is_three_decibels_down():
     assert gain / sweep.gain[0] == pytest.approx(10 ** (-3 / 20), rel=0.01)
 
 
+def test_a_gain_that_stays_up_has_no_bandwidth():
+    sweep = elbow_sinusoid().amplitudes[0]
+    assert replace(sweep, gain=np.ones_like(sweep.gain)).bandwidth is None
+
+
 def test_a_joint_is_at_rest_between_equal_muscles(elbow):
     head = mjhill.JOINTS["head"]
     assert resting_angle(head, dict.fromkeys(head.muscles, 0.3)) == pytest.approx(0.0, abs=1e-9)

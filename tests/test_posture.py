@@ -11,12 +11,12 @@ from mjhill.experiments.bench.posture import (
     balanced,
     check_ascending,
     held_levels,
-    net_torque,
+    holding,
     static_stiffness,
     stay,
     steadiest,
 )
-from mjhill.experiments.bench.rig import UnmeasuredError, angles, rig, still
+from mjhill.experiments.bench.rig import UnmeasuredError, angles, net_torque, rig, still
 
 
 def symmetric(optimum):
@@ -87,6 +87,19 @@ def test_levels_that_are_not_held_come_with_their_reason():
     assert "drifts away" in unheld[0].reason
     with pytest.raises(UnmeasuredError, match="drifts away"):
         held_levels(wrist, (0.5,), wrist.home_angle)
+
+
+@pytest.mark.parametrize("angle", [0.1, 2.2])
+def test_one_muscle_holds_a_joint_and_too_far_none_does(angle):
+    elbow = mjhill.JOINTS["elbow"]
+    inputs = holding(elbow, "elbow_flexor", angle)
+    assert abs(net_torque(elbow, inputs, angle)) < 1e-9
+    assert sum(level > 0 for level in inputs.values()) == 1
+    weak = {
+        name: replace(muscle, max_isometric_force=1e-6) for name, muscle in elbow.muscles.items()
+    }
+    with pytest.raises(UnmeasuredError, match=r"full input of .* does not hold elbow at .*°"):
+        holding(replace(elbow, muscles=weak), "elbow_flexor", angle)
 
 
 @pytest.mark.parametrize("values", [(), (0.1,), (0.2, 0.1), (0.1, 0.1), (0.0, 0.1), (0.5, 1.1)])

@@ -68,10 +68,17 @@ def test_claims_follow_from_the_releases(elbow):
     damped, rising = elbow.claims()
     over = [one for one in elbow.releases if one.swing.damping_ratio >= 1]
     assert damped.holds is (not over)
-    assert f"overdamped in {len(over)} of 9" in damped.evidence
+    assert f"not underdamped in {len(over)} of 9" in damped.evidence
     assert rising.holds
     calm = tuple(one for one in elbow.releases if one.level == 0.02)
     assert next(replace(elbow, releases=calm).claims()).holds
+    weak = tuple(
+        replace(one, swing=replace(one.swing, stiffness=one.spring + 3.0 + 0.1 * one.level))
+        for one in elbow.releases
+    )
+    assert list(replace(elbow, releases=weak).claims())[1].holds is False
+    lost = tuple(replace(o, swing=replace(o.swing, stiffness=-1.0)) for o in elbow.releases)
+    assert "damping ratios not found" in next(replace(elbow, releases=lost).claims()).evidence
     swapped = replace(elbow, releases=elbow.releases[::-1])
     assert not list(swapped.claims())[1].holds
 

@@ -7,8 +7,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
+from mjhill.experiments.bench.variants import AS_IT_IS, FLAT, LINEAR
 from mjhill.experiments.paper.step import Step, step
-from mjhill.experiments.trials.proportion import AS_IT_IS, FLAT, LINEAR
 from mjhill.experiments.trials.step_fit import fitted_step
 from mjhill.identification.second_order import step_response
 from mjhill.reference import rest_state, simulate
@@ -65,7 +65,7 @@ def test_a_ringing_response_leaves_stiffness_undetermined(elbow):
     one = fitted_step(elbow, "elbow_flexor", 0.1, time=time, response=response, start=0.0)
     assert "not determined" in one.doubt
     seen = {measure.name: measure.value for measure in one.measures()}
-    assert seen["elbow_flexor at 0.1: K"] is None
+    assert seen["elbow flexor at 0.1: K"] is None
 
 
 def test_a_stiff_linear_joint_goes_in_proportion_and_the_claim_falls(elbow):
@@ -112,8 +112,8 @@ def test_the_film_is_the_highest_step_of_the_first_muscle(elbow):
 
 def test_measures_have_table_2_beside_them():
     measures = {measure.name: measure for measure in elbow_step().measures()}
-    assert measures["elbow_flexor at 0.1: MAG"].published == (92.0, 92.0)
-    assert measures["elbow_flexor at 0.5: T2"].published == (100.0, 100.0)
+    assert measures["elbow flexor at 0.1: MAG"].published == (92.0, 92.0)
+    assert measures["elbow flexor at 0.5: T2"].published == (100.0, 100.0)
     assert elbow_step().as_dict()["joint"] == "elbow"
 
 

@@ -1,5 +1,7 @@
 """The first swing as that of a second-order system."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lsim
@@ -52,3 +54,10 @@ def test_a_system_that_runs_away_has_no_natural_frequency():
     assert swing.stiffness < 0
     assert swing.natural_frequency is None
     assert swing.damping_ratio is None
+
+
+def test_an_inertia_that_no_limb_has_is_not_seen():
+    found = replace(swung(10.0, 0.4), found_inertia=-0.01)
+    measures = {measure.name: measure for measure in swing_measures("x", found)}
+    assert measures["inertia J, found, x"].value is None
+    assert "none above 0" in measures["inertia J, found, x"].note

@@ -21,7 +21,7 @@ def test_the_figure_has_the_two_panels_of_the_paper():
     result, figure = experiments.synergists("elbow"), Figure()
     result.draw(figure)
     labels = [axis.get_xlabel() for axis in figure.axes]
-    assert labels == ["shortening velocity [rad/s]", "stretch [°]"]
+    assert labels == ["shortening velocity [°/s]", "stretch [°]"]
     assert len(figure.axes[0].get_lines()) == len(result.heads) + 2
 
 

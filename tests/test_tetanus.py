@@ -50,6 +50,12 @@ def test_at_its_best_angle_mid_range_gives_the_largest_torque_and_decides_nothin
     assert below.holds is None
 
 
+def test_a_torque_that_hardly_depends_on_angle_is_not_said_to_stay_below_the_largest():
+    flat = replace(MUSCLE, optimal_length=0.6, width_short=20.0, width_long=20.0)
+    *_, below = tetanus(make_joint(flat)).claims()
+    assert below.holds is False
+
+
 def test_electrical_stimulation_saves_about_the_time_constant_of_neural_excitation():
     found = tetanus(make_joint())
     saved = found.voluntary["puller"].rise - found.electrical["puller"].rise

@@ -112,7 +112,7 @@ def test_without_neural_excitation_to_bypass_nothing_is_gained():
 
 def test_published_twitches_stand_beside_those_of_the_ankle_only():
     ankle = {measure.name: measure for measure in twitch().measures()}
-    assert ankle["ankle_plantarflexor twitch, time to peak"].published == (91.0, 131.0)
+    assert ankle["ankle plantarflexor twitch, time to peak"].published == (91.0, 131.0)
     wrist = twitch("wrist")
     assert all(measure.published is None for measure in wrist.measures())
     assert [claim.holds for claim in wrist.claims()].count(None) == 2

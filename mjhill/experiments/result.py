@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from types import MappingProxyType
@@ -11,9 +12,16 @@ from typing import Any, ClassVar
 from mjhill.recording import Recording
 
 
+def spoken(text: str) -> str:
+    """A text with its identifiers in words: ``elbow flexor``; ``V_max`` stays as it is."""
+    return re.sub(r"(?<=[a-z0-9])_(?=[a-z0-9])", " ", text)
+
+
 @dataclass(frozen=True)
 class Measure:
     """A measured quantity, beside a published one where there is one.
+
+    Name and note are for people to read: identifiers in them become words, see ``spoken``.
 
     Attributes:
         name: What it is, such as ``time to peak of the dorsiflexor's twitch``.
@@ -31,6 +39,11 @@ class Measure:
     source: str = ""
     note: str = ""
 
+    def __post_init__(self) -> None:
+        """Put identifiers into words."""
+        object.__setattr__(self, "name", spoken(self.name))
+        object.__setattr__(self, "note", spoken(self.note))
+
 
 @dataclass(frozen=True)
 class Claim:
@@ -40,13 +53,17 @@ class Claim:
         sentence: The claim, in one sentence.
         section: Where the paper makes it, such as ``4.1.3, Fig. 6``.
         holds: Whether the experiment bears it out; None where it cannot tell.
-        evidence: The numbers that decide, with units.
+        evidence: The numbers that decide, with units; identifiers become words, see ``spoken``.
     """
 
     sentence: str
     section: str
     holds: bool | None
     evidence: str
+
+    def __post_init__(self) -> None:
+        """Put identifiers into words."""
+        object.__setattr__(self, "evidence", spoken(self.evidence))
 
 
 class Result(abc.ABC):

@@ -56,7 +56,7 @@ def angles(
     with installed():  # from the start: no batch runs under Python callbacks
         batch = _batch(joints, start, velocity, before, timestep)
         result[:, 1:] = batch.rollout(steps, inputs, _INPUTS)["qpos"][:, :, 0]
-    _check_warnings(batch, joints[0].name)
+    check_warnings(batch, joints[0].name)
     return result
 
 
@@ -99,7 +99,7 @@ def driving_torques(
             )
             batch.step()
             result[:, step] = inertial[:, step] - passive[:, 0] - muscles[:, 0]
-    _check_warnings(batch, joints[0].name)
+    check_warnings(batch, joints[0].name)
     return result
 
 
@@ -139,8 +139,12 @@ def _expand(batch: mujoco.batch.Batch, joints: Sequence[Joint]) -> None:
     batch.set_const()  # the mass matrix, which follows from the inertia
 
 
-def _check_warnings(batch: mujoco.batch.Batch, joint: str) -> None:
-    """Refuse simulations in which MuJoCo warned: they stop, or go on from a state put back."""
+def check_warnings(batch: mujoco.batch.Batch, joint: str) -> None:
+    """Refuse simulations in which MuJoCo warned: they stop, or go on from a state put back.
+
+    Raises:
+        RuntimeError: One did; the message has the warning's name and the joint.
+    """
     warned = batch.warning[:, :, 1] > 0  # counts by simulation and kind
     if warned.any():
         kind = mujoco.mjtWarning(int(np.argmax(warned.any(axis=0)))).name

@@ -9,6 +9,7 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from mjhill.experiments.result import spoken
 from mjhill.reproduction import words
 from mjhill.reproduction.store import FIGURE, FILM
 
@@ -34,8 +35,9 @@ def page(report: dict[str, Any], folder: Path) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    for name in ("number", "with_unit", "spoken", "duration", "option"):
+    for name in ("number", "with_unit", "duration", "option"):
         environment.filters[name] = getattr(words, name)
+    environment.filters["spoken"] = spoken
     return environment.get_template("template.html").render(
         style=(_HERE / "style.css").read_text(encoding="utf-8"),
         report=report,

@@ -1,4 +1,4 @@
-"""Numbers and names as a reader wants them."""
+"""Numbers as a reader wants them."""
 
 from __future__ import annotations
 
@@ -64,11 +64,6 @@ def difference(value: float | None, ends: Sequence[float] | None) -> str:
     if ratio > _FACTOR:
         return f"{number(float(f'{ratio:.2g}'))} times"
     return f"{abs(share):.0%} {side}".replace("%", f"{_THIN}%")
-
-
-def spoken(name: str) -> str:
-    """A name without underscores, as ``wrist rotation``."""
-    return name.replace("_", " ")
 
 
 def duration(seconds: float) -> str:

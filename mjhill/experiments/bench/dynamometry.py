@@ -14,20 +14,22 @@ from numpy.typing import ArrayLike, NDArray
 from mjhill.experiments.bench.rig import (
     Dynamometer,
     Rig,
-    UnmeasuredError,
+    check_batch,
     direction,
     dynamometer,
-    muscle_torque,
+    net_torque,
     rig,
+    run,
     still,
 )
 from mjhill.install import installed
 from mjhill.layout import addresses
 from mjhill.parameters import Joint
-from mjhill.reference import plant_torque
+from mjhill.recording import Recording
+from mjhill.signals import Signal, constant
 
 STIFF = radians(0.2)  # a machine that gives way so little counts as isometric [rad]
-STIFF_RINGING = 200.0  # ringing of the joint on it, at least [Hz]; its gauge lags by 1.6 ms
+STIFF_RINGING = 200.0  # ringing of the joint on it, at least [Hz]; its gauge lags by under 0.1 ms
 _FASTEST = 0.4  # ringing of the joint on its coupling, in 1/timestep; steps follow no faster one
 
 _RECORDED = ["qpos", "qvel", "act", "actuator_force"]
@@ -76,11 +78,7 @@ def zeroed(
 
     Its coupling is wound up by what muscles and passive elasticity pull there.
     """
-    known = levels or {}
-    pull = plant_torque(joint, angle) + sum(
-        muscle_torque(joint, name, known.get(name, 0.0), angle) for name in joint.muscles
-    )
-    return machine.drive(angle) - pull
+    return machine.drive(angle) - net_torque(joint, levels or {}, angle)
 
 
 def stimulated(joint: Joint) -> Joint:
@@ -128,8 +126,7 @@ def runs(
         control[:, :, model.actuator(name).id] = level
     with installed():
         found = batch.rollout(steps, control, int(mujoco.mjtState.mjSTATE_CTRL), _RECORDED)
-    if (batch.bind("time") < (steps - 0.5) * bench.timestep).any():  # one that warns stops
-        raise UnmeasuredError(f"{joint.name} on the dynamometer: the simulation went bad")
+    check_batch(batch, joint)
     # what is recorded after a step: the states of its end, the forces of its start
     angle = np.concatenate([paths[:, :1], found["qpos"][:, :-1, 0]], axis=1)
     act = np.concatenate([first[:, np.newaxis], found["act"][:, :-1]], axis=1)
@@ -142,6 +139,20 @@ def runs(
         machine.damping * rise - force,
         {name: act[:, :, address.act + 1] for name, address in addresses(model)},
     )
+
+
+def recorded(
+    joint: Joint, machine: Dynamometer, path: Values, muscle: str, *, before: float, level: float
+) -> Recording:
+    """One of the runs of ``active_torque`` as a recording, for the film; path of shape (T,)."""
+    bench, steady = rig(joint, machine=machine), {muscle: before}
+    drive = driven(bench, machine, path[np.newaxis], steady)[0]
+    since = bench.timestep * np.arange(len(path))
+    inputs = {
+        muscle: constant(level),
+        "dynamometer": Signal(lambda time: float(np.interp(time, since, drive))),
+    }
+    return run(bench, still(bench, float(path[0]), steady), float(since[-1]), excitation=inputs)
 
 
 def active_torque(

@@ -15,9 +15,8 @@ from math import degrees
 import numpy as np
 from scipy.optimize import brentq
 
-from mjhill.experiments.bench.rig import UnmeasuredError, direction, muscle_torque
+from mjhill.experiments.bench.rig import UnmeasuredError, antagonist, direction, net_torque
 from mjhill.parameters import Joint
-from mjhill.reference import plant_torque
 
 _TILT = 1e-4  # either way, for a slope [rad]
 _POSTURES = 121  # looked at over the range of motion, where the home angle will not do
@@ -36,12 +35,6 @@ class Unheld:
 
     label: str
     reason: str
-
-
-def net_torque(joint: Joint, inputs: Mapping[str, float], angle: float) -> float:
-    """Steady torque [N·m] of muscles and passive structures at an angle [rad]."""
-    pulls = (muscle_torque(joint, name, inputs.get(name, 0.0), angle) for name in joint.muscles)
-    return plant_torque(joint, angle) + sum(pulls)
 
 
 def static_stiffness(joint: Joint, inputs: Mapping[str, float], angle: float) -> float:
@@ -70,6 +63,26 @@ def balanced(joint: Joint, level: float, angle: float) -> dict[str, float]:
         )
     share = brentq(lambda x: net_torque(joint, inputs(x, yielding), angle), 0, 1, xtol=1e-14)
     return inputs(float(share), yielding)
+
+
+def holding(joint: Joint, agonist: str, angle: float) -> dict[str, float]:
+    """Inputs of the least effort that hold a joint at an angle [rad]: one muscle's, or none.
+
+    Raises:
+        UnmeasuredError: Full input does not hold it there.
+    """
+    levels = dict.fromkeys(joint.muscles, 0.0)
+    rest = net_torque(joint, levels, angle)
+    if rest == 0:
+        return levels
+    needs_agonist = rest * direction(joint, agonist) < 0
+    holder = agonist if needs_agonist else antagonist(joint, agonist)
+    if rest * net_torque(joint, {holder: 1.0}, angle) > 0:
+        raise UnmeasuredError(
+            f"full input of {holder} does not hold {joint.name} at {degrees(angle):.3g}°"
+        )
+    root = brentq(lambda u: net_torque(joint, {holder: u}, angle), 0.0, 1.0, xtol=1e-12)
+    return {**levels, holder: float(root)}
 
 
 def stay(

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 
 from scipy.optimize import brentq
 
-from mjhill.experiments.bench.rig import muscle_torque
+from mjhill.experiments.bench.rig import net_torque
 from mjhill.parameters import Joint
-from mjhill.reference import plant_torque
 
 
 def resting_angle(joint: Joint, levels: Mapping[str, float] | None = None) -> float:
@@ -23,9 +22,7 @@ def resting_angle(joint: Joint, levels: Mapping[str, float] | None = None) -> fl
     """
 
     def net(angle: float) -> float:
-        inputs = {**dict.fromkeys(joint.muscles, 0.0), **(levels or {})}
-        muscles = sum(muscle_torque(joint, name, u, angle) for name, u in inputs.items())
-        return plant_torque(joint, angle) + muscles
+        return net_torque(joint, levels or {}, angle)
 
     low, high = joint.range
     if net(low) * net(high) > 0:

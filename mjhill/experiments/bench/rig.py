@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from math import pi
 
 import mujoco
+import mujoco.batch
 import mujoco.rollout
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from mjhill.equilibrium import equilibrate
+from mjhill.identification.ensemble import check_warnings
 from mjhill.install import installed, without_python_callbacks
 from mjhill.joints import JOINTS
 from mjhill.parameters import Joint
@@ -44,6 +45,20 @@ def as_joint(joint: str | Joint) -> Joint:
     if joint not in JOINTS:
         raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(JOINTS)}")
     return JOINTS[joint]
+
+
+def as_muscle(joint: Joint, muscle: str | None) -> str:
+    """A muscle of a joint by name; the first, which pulls towards positive angles, for None.
+
+    Raises:
+        ValueError: There is none of that name.
+    """
+    if muscle is None:
+        return next(iter(joint.muscles))
+    if muscle not in joint.muscles:
+        known = ", ".join(joint.muscles)
+        raise ValueError(f"{joint.name}: unknown muscle {muscle!r}; there are: {known}")
+    return muscle
 
 
 @dataclass(frozen=True)
@@ -194,6 +209,18 @@ def run(
             raise UnmeasuredError(str(error)) from error
 
 
+def check_batch(batch: mujoco.batch.Batch, joint: Joint) -> None:
+    """Refuse simulations in which MuJoCo warned: they stop, or go on from a state put back.
+
+    Raises:
+        UnmeasuredError: One did; the message has the warning's name.
+    """
+    try:
+        check_warnings(batch, joint.name)
+    except RuntimeError as error:
+        raise UnmeasuredError(str(error)) from error
+
+
 def angles(
     bench: Rig, start: mujoco.MjData, duration: float, excitation: Mapping[str, Signal]
 ) -> NDArray[np.float64]:
@@ -233,38 +260,17 @@ def antagonist(joint: Joint, muscle: str) -> str:
     raise ValueError(f"{joint.name}: no muscle pulls against {muscle!r}")
 
 
-def holding(joint: Joint, agonist: str, angle: float) -> dict[str, float]:
-    """Inputs of the least effort that hold a joint at an angle [rad]: one muscle's, or none.
-
-    Raises:
-        UnmeasuredError: Full input does not hold it there.
-    """
-
-    def net(muscle: str, level: float) -> float:
-        levels = {**dict.fromkeys(joint.muscles, 0.0), muscle: level}
-        return plant_torque(joint, angle) + sum(
-            muscle_torque(joint, name, u, angle) for name, u in levels.items()
-        )
-
-    rest = net(agonist, 0.0)
-    needs_agonist = rest * direction(joint, agonist) < 0
-    holder = agonist if needs_agonist else antagonist(joint, agonist)
-    levels = dict.fromkeys(joint.muscles, 0.0)
-    if rest == 0:
-        return levels
-    if rest * net(holder, 1.0) > 0:
-        raise UnmeasuredError(
-            f"full input of {holder} does not hold {joint.name} at {angle:.3g} rad"
-        )
-    levels[holder] = float(brentq(lambda u: net(holder, u), 0.0, 1.0, xtol=1e-12))
-    return levels
-
-
 def muscle_torque(joint: Joint, muscle: str, level: float, angle: float) -> float:
     """Steady torque [N·m] of a muscle at an input, the joint held at an angle [rad]."""
     parameters, length = joint.muscles[muscle], joint.gears[muscle] * angle
     force = tension(parameters, steady_stretch(parameters, level, length))
     return -joint.gears[muscle] * force
+
+
+def net_torque(joint: Joint, inputs: Mapping[str, float], angle: float) -> float:
+    """Steady torque [N·m] of muscles and passive elasticity at an angle [rad]; inputs 0 unnamed."""
+    pulls = (muscle_torque(joint, name, inputs.get(name, 0.0), angle) for name in joint.muscles)
+    return plant_torque(joint, angle) + sum(pulls)
 
 
 def strongest_angle(joint: Joint, muscle: str) -> float:

@@ -9,6 +9,10 @@ from mjhill.experiments.bench.rig import direction
 from mjhill.parameters import Joint
 from mjhill.reference import plant_torque
 
+AS_IT_IS, FAST = "as it is", "without torque-velocity relation"
+LINEAR, FLAT = "with linear elasticity", "with flat torque-angle relation"
+SERIES = "with linear series element"
+
 _WIDE = 1e3  # widths [rad] that leave nothing of the active torque-angle relation
 _FAST = 50.0  # V_max in units of its own, at which force hardly depends on velocity
 _STRAIGHT = 0.01  # shape at which the series element is linear to half a percent

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.experiments.bench.frequency import SecondOrderFrequency, decibel
+from mjhill.experiments.figures.drawing import every
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 
 _Values = NDArray[np.float64]
@@ -27,7 +28,7 @@ class Swept(Protocol):
 
     @property
     def gain(self) -> _Values:
-        """In the output's unit over the drive's."""
+        """Angle over the drive [rad per unit]."""
 
     @property
     def phase(self) -> _Values:
@@ -58,7 +59,7 @@ def draw_bode(
     Args:
         figure: A Matplotlib figure.
         columns: Sweeps by what differs in them.
-        gain_label: Label of the gain's axis, in dB.
+        gain_label: Label of the gain's axis, in dB of a degree.
         band: Frequencies to shade [Hz].
     """
     ratios = {"height_ratios": [3, 3, 1.2]}
@@ -81,20 +82,22 @@ def draw_bode(
                 axis.axvspan(*band, color="0.5", alpha=0.12, lw=0)
     axes[0, 0].set_ylabel(gain_label)
     axes[1, 0].set_ylabel("phase [°]")
-    axes[1, 0].yaxis.set_major_locator(_every(90))
+    axes[1, 0].yaxis.set_major_locator(every(90))
     axes[2, 0].set_ylabel("coherence")
     axes[2, 0].set_ylim(0, 1.1)
 
 
 def _draw_sweep(gain: Any, phase: Any, coherence: Any, sweep: Swept, colour: Any) -> None:
     frequency = sweep.frequency
-    gain.plot(frequency, decibel(sweep.gain), "o-", ms=3.5, color=colour, label=sweep.name)
+    gain.plot(
+        frequency, decibel(np.degrees(sweep.gain)), "o-", ms=3.5, color=colour, label=sweep.name
+    )
     phase.plot(frequency, np.degrees(sweep.phase), "o-", ms=3.5, color=colour)
     coherence.plot(frequency, sweep.coherence, "o-", ms=2.5, color=colour)
     shown = frequency[frequency <= 2 * sweep.highest]
     if len(shown):
         fitted = sweep.fit.response(shown)
-        gain.plot(shown, decibel(np.abs(fitted)), "--", color=colour, lw=1.2)
+        gain.plot(shown, decibel(np.degrees(np.abs(fitted))), "--", color=colour, lw=1.2)
         phase.plot(shown, np.degrees(np.unwrap(np.angle(fitted))), "--", color=colour, lw=1.2)
 
 
@@ -105,9 +108,3 @@ def _mark_octaves(axis: Any, frequency: _Values) -> None:
     marks = 2.0 ** np.arange(np.ceil(low - 1e-9), np.floor(high + 1e-9) + 1)
     axis.set_xticks(marks, [f"{mark:g}" for mark in marks])
     axis.xaxis.set_minor_locator(NullLocator())
-
-
-def _every(step: float) -> Any:
-    from matplotlib.ticker import MultipleLocator
-
-    return MultipleLocator(step)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 
 def torque_unit(largest: float) -> tuple[float, str]:
     """Factor from N·m and unit in which torques up to ``largest`` [N·m] are easy to read."""
@@ -17,11 +19,18 @@ def tidy(axes: Any) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
+def shades(count: int) -> list[str]:
+    """Greys for ``count`` ascending levels, the highest black."""
+    return [f"{grey:.2f}" for grey in np.linspace(0.72, 0.0, count)] if count > 1 else ["0.0"]
+
+
+def every(step: float) -> Any:
+    """A locator of ticks a step apart."""
+    from matplotlib.ticker import MultipleLocator
+
+    return MultipleLocator(step)
+
+
 def legend_above(figure: Any, handles: Any, columns: int = 4) -> None:
     """One legend for the whole figure, above it, where no data are."""
     figure.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False)
-
-
-def spoken(muscle: str) -> str:
-    """The name of a muscle in words."""
-    return muscle.replace("_", " ")

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mjhill.experiments.figures.drawing import shades, tidy
+from mjhill.experiments.result import spoken
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 
 if TYPE_CHECKING:
@@ -13,17 +15,6 @@ if TYPE_CHECKING:
     from mjhill.experiments.trials.hit import Hit
 
 _SHOWN = 0.6  # [s]
-
-
-def shades(count: int) -> list[str]:
-    """Greys for ``count`` ascending levels, the highest black."""
-    return [f"{grey:.2f}" for grey in np.linspace(0.72, 0.0, count)] if count > 1 else ["0.0"]
-
-
-def tidy(axes: Any) -> None:
-    """The grid and frame of every plot."""
-    axes.grid(color="0.9", lw=0.8)
-    axes.spines[["top", "right"]].set_visible(False)
 
 
 def draw(result: ExternalImpulse, figure: Any) -> None:
@@ -57,7 +48,7 @@ def _burst(upper: Any, lower: Any, result: ExternalImpulse) -> None:
     burst, time = result.burst, 1e3 * result.burst.run.time
     names = [name.removesuffix(".u") for name in burst.run if name.endswith(".u")]
     for name, colour in zip(names, MUSCLE_COLOURS, strict=False):
-        upper.plot(time, burst.run[f"{name}.u"], color=colour, label=name.replace("_", " "))
+        upper.plot(time, burst.run[f"{name}.u"], color=colour, label=spoken(name))
         lower.plot(time, burst.without[f"{name}.force"], color=colour, ls="--", lw=1)
         lower.plot(time, burst.run[f"{name}.force"], color=colour)
     upper.set_title("c  a burst of input during the response", fontsize=10)

@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjhill.experiments.bench.frequency import decibel
-from mjhill.experiments.figures.external_impulse import shades, tidy
+from mjhill.experiments.figures.drawing import every, shades, tidy
+from mjhill.experiments.result import spoken
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 
 if TYPE_CHECKING:
     from mjhill.experiments.paper.external_sinusoid import ExternalSinusoid
 
-_ROWS = ("gain [dB re 1 rad/(N·m)]", "phase [°]", "coherence [-]")
+_ROWS = ("gain [dB re 1°/(N·m)]", "phase [°]", "coherence [-]")
 
 
 def draw(result: ExternalSinusoid, figure: Any) -> None:
     """Draw the result into a Matplotlib figure."""
     grid = figure.subplots(3, 2, sharex=True, sharey="row", height_ratios=(2, 1.6, 1))
-    muscle = result.muscle.replace("_", " ")
-    _column(grid[:, 0], result.bias, f"bias held by the {muscle}")
+    _column(grid[:, 0], result.bias, f"bias held by the {spoken(result.muscle)}")
     _column(grid[:, 1], result.cocontraction, "co-contraction")
     if result.neural is not None:
         _neural(grid[:, 1], result)
@@ -31,7 +31,7 @@ def draw(result: ExternalSinusoid, figure: Any) -> None:
     for axes in grid[0]:
         if axes.lines:
             axes.legend(frameon=False, fontsize=8, loc="lower left")
-    grid[1, 0].yaxis.set_major_locator(_locator(90))
+    grid[1, 0].yaxis.set_major_locator(every(90))
     grid[2, 0].set_ylim(0, 1.05)
     figure.align_ylabels(grid)
 
@@ -61,12 +61,6 @@ def _neural(column: Any, result: ExternalSinusoid) -> None:
 
 def _lines(column: Any, curve: Any, scale: float = 1.0, **style: Any) -> None:
     heard = curve.coherence > 0.5  # a fainter response is as much drift as answer
-    column[0].plot(curve.frequency[heard], decibel(scale * curve.gain[heard]), **style)
+    column[0].plot(curve.frequency[heard], decibel(scale * np.degrees(curve.gain[heard])), **style)
     column[1].plot(curve.frequency[heard], np.degrees(curve.phase[heard]), **style)
     column[2].plot(curve.frequency, curve.coherence, **style)
-
-
-def _locator(step: float) -> Any:
-    from matplotlib.ticker import MultipleLocator
-
-    return MultipleLocator(step)

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mjhill.experiments.figures.drawing import spoken, tidy, torque_unit
+from mjhill.experiments.figures.drawing import tidy, torque_unit
+from mjhill.experiments.result import spoken
 from mjhill.experiments.trials.stretch import Stretch
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 
@@ -40,7 +41,9 @@ def draw(figure: Any, muscle: str, stretches: Mapping[float, tuple[Stretch, ...]
     relative = "torque, of isometric [-]"
     _label(grid[0, 1], "while it is stretched", "stretch [°]", relative)
     _label(grid[1, 0], "after the stretch", "time from its end [ms]", relative)
-    grid[1, 0].set_xlim(0, 1e3 * min(_AFTER, 1.5 * max(one.recovery(0.01) for one in found)))
+    grid[1, 0].set_xlim(
+        0, 1e3 * min(_AFTER, 1.5 * max(one.recovery(0.01) or _AFTER for one in found))
+    )
     _draw_velocities(grid[1, 1], stretches)
     figure.legend(
         *grid[0, 1].get_legend_handles_labels(), loc="outside upper center", ncols=6,

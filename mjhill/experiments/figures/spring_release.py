@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjhill.experiments.figures.external_impulse import shades, tidy
+from mjhill.experiments.figures.drawing import shades, tidy
+from mjhill.experiments.result import spoken
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def _trajectories(
         # a paler line is one of a lower level, as above
         opacity = 1.0 - float(shade)
         for (name, _), colour in zip(_muscles(result), MUSCLE_COLOURS, strict=False):
-            label = name.replace("_", " ") if one is releases[-1] else None
+            label = spoken(name) if one is releases[-1] else None
             force = one.run[f"{name}.force"]
             lower.plot(time, force, color=colour, alpha=opacity, label=label)
     upper.legend(title="co-contraction", title_fontsize=8, frameon=False, fontsize=8)

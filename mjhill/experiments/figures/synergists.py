@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mjhill.equivalent import stretch_at_force, torque_at_velocity
+from mjhill.experiments.figures.drawing import tidy
 from mjhill.parameters import Muscle
 
 # blue, orange, green, purple of Okabe & Ito 2008; dashes where heads hide one another
@@ -29,16 +30,21 @@ def draw(heads: Mapping[str, Muscle], equivalent: Muscle, figure: Any) -> None:
     speeds = np.linspace(0, max(muscle.max_velocity for muscle in heads.values()), 16)
     total = torque_at_velocity(list(heads.values()), speeds)
     speed_axis.plot(
-        speeds, total, "o", color="0.45", markersize=5, label="sum of heads", clip_on=False
+        np.degrees(speeds),
+        total,
+        "o",
+        color="0.45",
+        markersize=5,
+        label="sum of heads",
+        clip_on=False,
     )
     speed_axis.set_title("(a) torque and velocity")
-    speed_axis.set_xlabel("shortening velocity [rad/s]")
+    speed_axis.set_xlabel("shortening velocity [°/s]")
     speed_axis.set_ylabel("torque [N·m]")
     stretch_axis.set_title("(b) series elements")
     stretch_axis.set_xlabel("stretch [°]")
     for axis in (speed_axis, stretch_axis):
-        axis.grid(color="0.9", linewidth=0.8)
-        axis.spines[["top", "right"]].set_visible(False)
+        tidy(axis)
         axis.set(xlim=(0, None), ylim=(0, None))
     spacing = {"columnspacing": 1.2, "handlelength": 1.5, "handletextpad": 0.5}
     figure.legend(loc="outside lower center", ncols=5, frameon=False, **spacing)
@@ -46,6 +52,7 @@ def draw(heads: Mapping[str, Muscle], equivalent: Muscle, figure: Any) -> None:
 
 def _draw(speed_axis: Any, stretch_axis: Any, muscle: Muscle, **style: Any) -> None:
     speeds, shares = np.linspace(0, muscle.max_velocity, 200), np.linspace(0, 1, 100)
-    speed_axis.plot(speeds, torque_at_velocity([muscle], speeds), linewidth=2.2, **style)
+    torque = torque_at_velocity([muscle], speeds)
+    speed_axis.plot(np.degrees(speeds), torque, linewidth=2.2, **style)
     stretch, torque = stretch_at_force(muscle, shares), shares * muscle.max_isometric_force
     stretch_axis.plot(np.degrees(stretch), torque, linewidth=2.2, **{**style, "label": None})

@@ -38,6 +38,7 @@ from mjhill.experiments.trials.hit import (
     rises,
     shrinks,
     stiffens,
+    strongly_rises,
 )
 from mjhill.experiments.trials.neural_burst import Burst, hit_with_burst
 from mjhill.experiments.trials.swing import swing_measures
@@ -92,14 +93,14 @@ class ExternalImpulse(Result):
             yield Measure(f"viscosity B, {label}", hit.swing.damping, "N·m·s/rad")
         yield from self.burst.measures()
         for one in self.unheld:
-            yield Measure(f"response at {one.label}", None, "rad", note=one.reason)
+            yield Measure(f"response at {one.label}", None, "°", note=one.reason)
 
     def claims(self) -> Iterator[Claim]:
         """The five claims of the section."""
         yield self._claim(
             "The response to an impulse depends strongly on co-contraction: "
-            "it falls as that rises.",
-            falls(self.small),
+            "it falls as that rises (here: to half or less).",
+            strongly_rises([1 / hit.swing.peak for hit in self.small]),
             "peaks " + at(self.small, lambda s: f"{degrees(s.peak):.2f}°"),
         )
         yield self._claim(

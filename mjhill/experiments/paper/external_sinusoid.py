@@ -31,7 +31,7 @@ from mjhill.experiments.bench.posture import (
     static_stiffness,
     steadiest,
 )
-from mjhill.experiments.bench.rig import as_joint, rig
+from mjhill.experiments.bench.rig import UnmeasuredError, as_joint, as_muscle, rig
 from mjhill.experiments.figures.external_sinusoid import draw
 from mjhill.experiments.result import Claim, Measure, Result
 from mjhill.experiments.trials.sinusoids import Curve, shaken
@@ -75,11 +75,11 @@ class ExternalSinusoid(Result):
         for curve in (*self.bias, *self.cocontraction):
             label, low = curve.drive.label, curve.frequency[0]
             note = "" if curve.resonance else "not within the band"
-            yield Measure(f"gain at {low:.3g} Hz, {label}", curve.low_gain, "rad/(N·m)")
+            yield Measure(f"gain at {low:.3g} Hz, {label}", degrees(curve.low_gain), "°/(N·m)")
             yield Measure(f"resonance, {label}", curve.resonance, "Hz", note=note)
             yield Measure(f"least coherence, {label}", float(curve.coherence.min()), "-")
         for one in self.unheld:
-            yield Measure(f"response under {one.label}", None, "rad/(N·m)", note=one.reason)
+            yield Measure(f"response under {one.label}", None, "°/(N·m)", note=one.reason)
 
     def claims(self) -> Iterator[Claim]:
         """The three claims of the section."""
@@ -104,7 +104,7 @@ class ExternalSinusoid(Result):
             self.section,
             None if undecided else falls and rises,
             "; ".join(
-                f"{curve.drive.label}: {curve.low_gain:.3g} rad/(N·m), resonance {resonance}"
+                f"{curve.drive.label}: {degrees(curve.low_gain):.3g}°/(N·m), resonance {resonance}"
                 for curve, resonance in zip(curves, shown, strict=True)
             ),
         )
@@ -163,12 +163,10 @@ def external_sinusoid(
 
     Raises:
         ValueError: The joint or the muscle is unknown or an option is out of range.
-        UnmeasuredError: The joint stays in none of the conditions.
+        UnmeasuredError: The joint stays in none of the conditions, or not where it is relaxed.
     """
     joint = as_joint(joint)
-    muscle = next(iter(joint.muscles)) if muscle is None else muscle
-    if muscle not in joint.muscles:
-        raise ValueError(f"unknown muscle {muscle!r}; there are: {', '.join(joint.muscles)}")
+    muscle = as_muscle(joint, muscle)
     shares = check_ascending("shares", shares, -1e-9, 1.0)
     levels = check_ascending("levels", levels, 0.0, 1.0)
     check_angle(joint, angle)
@@ -178,6 +176,8 @@ def external_sinusoid(
     if angle is None:
         angle = steadiest(joint, [condition for _, condition in (bias | both).values()])
     relaxed = static_stiffness(joint, {}, angle)
+    if relaxed <= 0:
+        raise UnmeasuredError(f"relaxed, {joint.name} drifts away from {degrees(angle):.3g}°")
     frequency = frequencies(joint, band, relaxed)
     held, unheld = held_drives(joint, bias | both, angle, relaxed * deflection)
     drives = list(held.values())

@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from mjhill.experiments.bench.rig import (
     UnmeasuredError,
     as_joint,
+    as_muscle,
     direction,
+    net_torque,
     rig,
     strongest_angle,
 )
@@ -28,7 +30,6 @@ from mjhill.experiments.result import Claim, Measure, Result
 from mjhill.experiments.trials.quick_release import (
     RELEASE,
     Point,
-    net_torque,
     own_curve,
     reading,
     released,
@@ -196,12 +197,12 @@ def isotonic(
         UnmeasuredError: Fewer than three loads pass the angle.
     """
     joint = as_joint(joint)
-    muscle = next(iter(joint.muscles)) if muscle is None else muscle
-    _check(joint, muscle, loads, duration)
+    muscle = as_muscle(joint, muscle)
+    _check(loads, duration)
     sign = direction(joint, muscle)
     angle, start = _angles(joint, muscle, angle, start)
     bench = rig(joint)
-    held = sign * net_torque(joint, muscle, start)
+    held = sign * net_torque(joint, {muscle: 1.0}, start)
     if held <= 0:
         raise UnmeasuredError(f"{muscle} does not pull against a load at {degrees(start):.0f}°")
     points, missed, recordings = [], [], {}
@@ -235,10 +236,7 @@ def isotonic(
     )
 
 
-def _check(joint: Joint, muscle: str, loads: Sequence[float], duration: float) -> None:
-    if muscle not in joint.muscles:
-        known = ", ".join(joint.muscles)
-        raise ValueError(f"{joint.name}: unknown muscle {muscle!r}; there are: {known}")
+def _check(loads: Sequence[float], duration: float) -> None:
     if len(loads) < _FEWEST or list(loads) != sorted({u for u in loads if 0 <= u < 1}):
         raise ValueError(
             f"loads must be at least {_FEWEST}, ascending, in [0, 1) of the torque held, "

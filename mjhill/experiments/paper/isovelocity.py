@@ -10,8 +10,14 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjhill.experiments.bench.dynamometry import driven, machine_giving_way, stiff_machine
-from mjhill.experiments.bench.rig import Dynamometer, UnmeasuredError, as_joint, rig, run, still
+from mjhill.experiments.bench.dynamometry import machine_giving_way, recorded, stiff_machine
+from mjhill.experiments.bench.rig import (
+    Dynamometer,
+    UnmeasuredError,
+    as_joint,
+    as_muscle,
+    rig,
+)
 from mjhill.experiments.figures.isovelocity import draw
 from mjhill.experiments.paper.isovelocity_claims import Curves, claims
 from mjhill.experiments.result import Claim, Measure, Result
@@ -26,7 +32,6 @@ from mjhill.experiments.trials.torque_velocity import (
 )
 from mjhill.parameters import Joint
 from mjhill.recording import Recording
-from mjhill.signals import Signal
 
 SHARES = (  # of the contractile element's largest velocity
     *(-0.4, -0.2, -0.1, -0.05, -0.025),
@@ -118,9 +123,7 @@ def isovelocity(
         UnmeasuredError: The series element is so stiff that it cannot be told from none.
     """
     subject = as_joint(joint)
-    chosen = next(iter(subject.muscles)) if muscle is None else muscle
-    if chosen not in subject.muscles:
-        raise ValueError(f"unknown muscle {chosen!r}; there are: {', '.join(subject.muscles)}")
+    chosen = as_muscle(subject, muscle)
     parameters = subject.muscles[chosen]
     top = parameters.max_velocity / abs(subject.gears[chosen])
     wanted = _numbers("velocities", top * np.array(SHARES) if velocities is None else velocities)
@@ -184,13 +187,6 @@ def _recording(joint: Joint, machine: Dynamometer, sweep: Sweep) -> dict[str, Re
     """A contraction at the middle of the velocities of shortening, started relaxed."""
     shortening = sweep.velocities[sweep.shortening]
     one = replace(sweep, velocities=shortening[len(shortening) // 2 :][:1])
-    bench = rig(joint, machine=machine)
-    path, time = paths(one, bench.timestep)
-    drive = driven(bench, machine, path, None)[0]
-    inputs = {
-        sweep.muscle: Signal(lambda t: 1.0),
-        "dynamometer": Signal(lambda t: float(np.interp(t, time, drive))),
-    }
-    start = still(bench, sweep.long)
-    recording = run(bench, start, float(time[-1]), excitation=inputs)
+    path, _ = paths(one, rig(joint).timestep)
+    recording = recorded(joint, machine, path[0], sweep.muscle, before=0.0, level=1.0)
     return {f"{degrees(one.velocities[0]):.0f}°/s, started relaxed": recording}

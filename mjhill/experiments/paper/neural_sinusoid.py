@@ -64,9 +64,11 @@ class NeuralSinusoid(Result):
         for name, sweep in self.sweeps().items():
             lowest = f"{sweep.frequency[0]:g} Hz"
             yield Measure(f"{name}: gain at {lowest}", degrees(sweep.gain[0]), "° per unit input")
-            yield Measure(f"{name}: bandwidth (-3 dB)", sweep.bandwidth, "Hz")
+            past = "" if sweep.bandwidth else "past the highest frequency"
+            yield Measure(f"{name}: bandwidth (-3 dB)", sweep.bandwidth, "Hz", note=past)
             seen = sweep.highest or None
-            yield Measure(f"{name}: second order up to", seen, "Hz")
+            none = "" if seen else "not even at the lowest frequencies"
+            yield Measure(f"{name}: second order up to", seen, "Hz", note=none)
             if seen:
                 fit = sweep.fit
                 yield Measure(f"{name}: natural frequency", fit.natural_frequency, "Hz")
@@ -130,7 +132,7 @@ class NeuralSinusoid(Result):
         draw_bode(
             figure,
             {"amplitude": self.amplitudes, "offset": self.offsets},
-            gain_label="gain [dB of 1 rad]",
+            gain_label="gain [dB re 1° per unit input]",
             band=_SECOND_ORDER,
         )
 

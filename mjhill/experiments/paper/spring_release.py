@@ -17,12 +17,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import pairwise
 from math import degrees, radians
 from types import MappingProxyType
 from typing import Any, ClassVar
-
-import numpy as np
 
 from mjhill.experiments.bench.posture import (
     Unheld,
@@ -36,6 +33,7 @@ from mjhill.experiments.bench.posture import (
 from mjhill.experiments.bench.rig import as_joint
 from mjhill.experiments.figures.spring_release import draw
 from mjhill.experiments.result import Claim, Measure, Result
+from mjhill.experiments.trials.hit import strongly_rises
 from mjhill.experiments.trials.spring_trial import Release, release
 from mjhill.experiments.trials.swing import swing_measures
 from mjhill.parameters import Joint
@@ -84,15 +82,16 @@ class SpringRelease(Result):
             yield Measure(f"stiffness of the joint alone, {label}", one.stiffness, "N·m/rad")
             yield from swing_measures(f"joint and spring, {label}", one.swing)
         for unheld in self.unheld:
-            yield Measure(f"release at {unheld.label}", None, "rad", note=unheld.reason)
+            yield Measure(f"release at {unheld.label}", None, "°", note=unheld.reason)
 
     def claims(self) -> Iterator[Claim]:
         """The two claims of the section."""
         ratios = [one.swing.damping_ratio for one in self.releases]
+        found = [ratio for ratio in ratios if ratio is not None]
         both = zip(self.releases, ratios, strict=True)
         over = [one for one, ratio in both if ratio is None or ratio >= 1]
+        span = f"{min(found):.2f} to {max(found):.2f}" if found else "not found"
         misfits = [one.swing.misfit for one in self.releases]
-        found = [ratio for ratio in ratios if ratio is not None]
         whole = [one.swing.misfit_of_run for one in self.releases]
         which = ", ".join(f"{one.spring:.3g} N·m/rad at {one.level:g}" for one in over)
         yield Claim(
@@ -100,15 +99,15 @@ class SpringRelease(Result):
             "second-order system.",
             self.section,
             not over and max(misfits) <= _CLOSE,
-            f"damping ratios {min(found, default=np.nan):.2f} to {max(found, default=np.nan):.2f}, "
-            f"misfits over a period of limb and spring {min(misfits):.1%} to {max(misfits):.1%} of "
-            f"the peak (up to {_CLOSE:.0%} is good), of the whole run {min(whole):.1%} to "
-            f"{max(whole):.1%}; overdamped in {len(over)} of {len(ratios)}"
+            f"damping ratios {span}, misfits over a period of limb and spring {min(misfits):.1%} "
+            f"to {max(misfits):.1%} of the peak (up to {_CLOSE:.0%} is good), of the whole run "
+            f"{min(whole):.1%} to {max(whole):.1%}; not underdamped in {len(over)} of {len(ratios)}"
             f"{': ' if over else ''}{which}",
         )
         rising = all(_rises(releases) for releases in self.by_spring().values())
         yield Claim(
-            "Stiffness and viscosity of the joint are strong functions of co-contraction.",
+            "Stiffness and viscosity of the joint are strong functions of co-contraction (here: "
+            "both rise with it, to twice as much or more).",
             "4.3.1, Fig. 10b",
             rising if len(self.levels) > 1 else None,
             f"at co-contraction {_list(self.levels)}: "
@@ -134,11 +133,9 @@ def _list(values: Iterable[float]) -> str:
 
 
 def _rises(releases: Sequence[Release]) -> bool:
-    """Whether K and B rise from level to level."""
-    return all(
-        a.stiffness < b.stiffness and a.swing.damping < b.swing.damping
-        for a, b in pairwise(releases)
-    )
+    """Whether K and B rise strongly with the level."""
+    stiffness = [one.stiffness for one in releases]
+    return strongly_rises(stiffness) and strongly_rises([one.swing.damping for one in releases])
 
 
 def spring_release(

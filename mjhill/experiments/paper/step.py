@@ -17,15 +17,9 @@ from numpy.typing import NDArray
 
 from mjhill.comparison.responses import settling_time
 from mjhill.experiments.bench.rig import as_joint, rig, run, still
-from mjhill.experiments.result import Claim, Measure, Result
-from mjhill.experiments.trials.proportion import (
-    AS_IT_IS,
-    FLAT,
-    LINEAR,
-    LONG,
-    proportions,
-    step_responses,
-)
+from mjhill.experiments.bench.variants import AS_IT_IS, FLAT, LINEAR
+from mjhill.experiments.result import Claim, Measure, Result, spoken
+from mjhill.experiments.trials.proportion import LONG, proportions, step_responses
 from mjhill.experiments.trials.step_fit import StepFit, fitted_step
 from mjhill.identification.evidence import SHAPE_SPREAD
 from mjhill.identification.second_order import step_response
@@ -92,7 +86,10 @@ class Step(Result):
         yield _claim(
             "That is due primarily to the parallel elasticity (here: more than to the active "
             "torque-angle relation).",
-            [ratios[LINEAR] > ratios[FLAT] for ratios in self.proportion.values()],
+            [
+                ratios[LINEAR] > max(ratios[FLAT], ratios[AS_IT_IS])
+                for ratios in self.proportion.values()
+            ],
             [
                 f"{muscle} from rest: {ratios[AS_IT_IS]:.2f} times as far, {LINEAR} "
                 f"{ratios[LINEAR]:.2f}, {FLAT} {ratios[FLAT]:.2f}"
@@ -130,7 +127,7 @@ class Step(Result):
         for axis, muscle, colour in zip(axes, muscles, MUSCLE_COLOURS, strict=False):
             for step in (step for step in self.steps if step.muscle == muscle):
                 self._draw_step(axis, step, colour)
-            axis.set_title(muscle.replace("_", " "), fontsize="medium")
+            axis.set_title(spoken(muscle), fontsize="medium")
             axis.set_xlabel("time [s]")
             axis.set_xlim(0, self.time[-1])
             axis.grid(alpha=0.3)

@@ -61,7 +61,7 @@ class Synergists(Result):
         """Torque, speed and stretch of each head and of the equivalent."""
         for name, muscle in {**self.heads, "equivalent": self.equivalent}.items():
             yield Measure(f"{name}: largest torque", muscle.max_isometric_force, "N·m")
-            yield Measure(f"{name}: V_max", muscle.max_velocity, "rad/s")
+            yield Measure(f"{name}: V_max", degrees(muscle.max_velocity), "°/s")
             yield Measure(f"{name}: Hill's A", muscle.hill_shape, "-")
             yield Measure(
                 f"{name}: stretch at the largest torque", degrees(muscle.series_stretch), "°"

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from mjhill.experiments.bench.dynamometry import stiff_machine, stimulated
 from mjhill.experiments.bench.rig import as_joint
-from mjhill.experiments.figures.drawing import legend_above, spoken, tidy, torque_unit
-from mjhill.experiments.result import Claim, Measure, Result
+from mjhill.experiments.figures.drawing import legend_above, tidy, torque_unit
+from mjhill.experiments.result import Claim, Measure, Result, spoken
 from mjhill.experiments.trials.muscle_twitch import PULSE, TWITCH_TIME, MuscleTwitch, muscle_twitch
 from mjhill.identification.facts import read_entries
 from mjhill.parameters import Joint

@@ -11,11 +11,11 @@ import itertools
 
 import numpy as np
 
+from mjhill.experiments.bench.posture import holding
 from mjhill.experiments.bench.rig import (
     UnmeasuredError,
     antagonist,
     direction,
-    holding,
     rig,
     run,
     still,

@@ -15,6 +15,7 @@ from mjhill.signals import Signal, pulse
 
 _TRIES, _CLOSE = 8, 0.01  # of the search for an impulse, and how near is near enough
 _GUESS = 0.1  # in which a first guess has the joint at its peak [s]
+_STRONG = 2.0  # factor between the lowest and the highest level of what depends strongly on it
 _SHRUNK = 0.5  # of a dependence that is to be called smaller: no more than half
 
 
@@ -102,6 +103,11 @@ def impedance(swing: Swing) -> str:
 def falls(hits: Sequence[Hit]) -> bool:
     """Whether the peak falls from level to level."""
     return all(a.swing.peak > b.swing.peak for a, b in pairwise(hits))
+
+
+def strongly_rises(values: Sequence[float]) -> bool:
+    """Whether numbers rise from each to the next, and to twice the first or more."""
+    return all(a < b for a, b in pairwise(values)) and values[-1] >= _STRONG * values[0]
 
 
 def stiffens(hits: Sequence[Hit]) -> bool:

@@ -15,6 +15,7 @@ from mjhill.experiments.bench.rig import (
     UnmeasuredError,
     direction,
     muscle_torque,
+    net_torque,
     rig,
     run,
     still,
@@ -110,8 +111,7 @@ def _hit_by_a_degree(
 ) -> tuple[Recording, float, float]:
     """The run in which a hit deflects the joint by 1°, the hit and the steady load [N·m]."""
     joint, levels = bench.joint, {muscle: share}
-    held = sum(muscle_torque(joint, name, levels.get(name, 0.0), angle) for name in joint.muscles)
-    load = -(held + plant_torque(joint, angle))
+    load = -net_torque(joint, levels, angle)
     sign = -direction(joint, muscle)
     hit = joint.inertia * _DEFLECTION / _HIT**2
     for _ in range(_TRIES):

@@ -9,7 +9,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.rig import direction, run, still
+from mjhill.experiments.bench.rig import UnmeasuredError, direction, run, still
 from mjhill.experiments.result import Claim, Measure
 from mjhill.experiments.trials.hit import Hammer
 from mjhill.parameters import Joint
@@ -91,10 +91,15 @@ def hit_with_burst(
         levels: Inputs that hold it.
         impulse: Of the hit [N·m·s].
         height: What the burst adds to the input, less where the input would pass 1 [-].
+
+    Raises:
+        UnmeasuredError: The input is 1 already.
     """
     bench, torque = hammer.bench(joint), hammer.torque(impulse)
     muscle = next(name for name in levels if direction(joint, name) == -hammer.sign)
     height = min(height, 1.0 - levels[muscle])
+    if height <= 0:
+        raise UnmeasuredError(f"the input of {muscle} is full, so that no burst can be added to it")
     burst = levels[muscle] + pulse(height, _START, _WIDTH)
     runs = [
         run(

@@ -8,12 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.experiments.bench.rig import direction
-from mjhill.experiments.bench.variants import with_flat_torque, with_linear_elasticity
+from mjhill.experiments.bench.variants import (
+    AS_IT_IS,
+    FLAT,
+    LINEAR,
+    with_flat_torque,
+    with_linear_elasticity,
+)
 from mjhill.identification.ensemble import angles
 from mjhill.parameters import Joint
 
-AS_IT_IS = "as it is"
-LINEAR, FLAT = "with a linear elasticity", "with a flat torque-angle relation"
 LONG = 10.0  # by when the slowest joint has settled [s]
 
 _Values = NDArray[np.float64]

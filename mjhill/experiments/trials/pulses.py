@@ -12,6 +12,11 @@ from numpy.typing import NDArray
 from mjhill.experiments.bench.rest import resting_angle
 from mjhill.experiments.bench.rig import UnmeasuredError, direction
 from mjhill.experiments.bench.variants import (
+    AS_IT_IS,
+    FAST,
+    FLAT,
+    LINEAR,
+    SERIES,
     with_fast_muscles,
     with_flat_torque,
     with_linear_elasticity,
@@ -21,9 +26,6 @@ from mjhill.experiments.result import Measure
 from mjhill.identification.ensemble import angles
 from mjhill.parameters import Joint
 
-AS_IT_IS, FAST = "as it is", "without torque-velocity relation"
-LINEAR, FLAT = "with linear elasticity", "with flat torque-angle relation"
-SERIES = "with linear series element"
 _VISIBLE = 1e-3  # least travel that a ratio is taken of, as a share of the largest
 
 _Values = NDArray[np.float64]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.rig import Rig, direction, muscle_torque, run, still
+from mjhill.experiments.bench.rig import Rig, direction, run, still
 from mjhill.parameters import Joint, Muscle
 from mjhill.readings import shortening_velocity, steady_stretch, tension
 from mjhill.recording import Recording
@@ -38,13 +38,6 @@ class Point:
     viscous: float
     elastic: float
     shortening: float
-
-
-def net_torque(joint: Joint, muscle: str, angle: float) -> float:
-    """Torque of the joint with the muscle in tetanus at an angle, without a load [N·m]."""
-    levels = {**dict.fromkeys(joint.muscles, 0.0), muscle: 1.0}
-    muscles = sum(muscle_torque(joint, name, u, angle) for name, u in levels.items())
-    return muscles + plant_torque(joint, angle)
 
 
 def released(

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mjhill.experiments.bench.drives import Drive
 from mjhill.experiments.bench.frequency import response_at
-from mjhill.experiments.bench.posture import net_torque
-from mjhill.experiments.bench.rig import Rig, still
+from mjhill.experiments.bench.rig import Rig, check_batch, net_torque, still
 from mjhill.install import installed
 
 _INPUTS = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
@@ -73,6 +72,9 @@ def shaken(bench: Rig, angle: float, drives: Sequence[Drive], frequency: ArrayLi
         angle: Where it is held [rad].
         drives: What oscillates, a curve each.
         frequency: [Hz], shape (F,), ascending.
+
+    Raises:
+        UnmeasuredError: MuJoCo warned that a run went bad.
     """
     band = np.asarray(frequency, dtype=np.float64)
     step, count = bench.timestep, len(band)
@@ -95,6 +97,7 @@ def shaken(bench: Rig, angle: float, drives: Sequence[Drive], frequency: ArrayLi
         inputs[rows, :, -1] = biases[-1] + drive.torque * waves
     with installed():
         angles = batch.rollout(steps, inputs, _INPUTS)["qpos"][:, :, 0]
+    check_batch(batch, bench.joint)
     # recorded after each step
     time = (np.arange(steps) + 1) * step
     shown, waves = slice(rise, None), _waves(band, time, rise * step)

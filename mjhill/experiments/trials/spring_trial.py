@@ -8,8 +8,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from mjhill.experiments.bench.posture import net_torque
-from mjhill.experiments.bench.rig import Spring, rig, run, still
+from mjhill.experiments.bench.rig import Spring, net_torque, rig, run, still
 from mjhill.experiments.trials.swing import Swing, first_swing
 from mjhill.parameters import Joint
 from mjhill.recording import Recording

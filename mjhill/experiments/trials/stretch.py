@@ -68,11 +68,17 @@ class Stretch:
         """Relative torque above the isometric one 1.5 s after the stretch [-]."""
         return float(self.relative[-1]) - 1.0
 
-    def recovery(self, band: float) -> float:
-        """Time after the stretch from which torque stays within ``band`` of isometric [s]."""
+    def recovery(self, band: float) -> float | None:
+        """Time after the stretch from which torque stays within ``band`` of isometric [s].
+
+        None where it is not back by the end of the run.
+        """
         after = self.time >= self.stop
         outside = np.flatnonzero(np.abs(self.relative[after] - 1.0) > band)
-        return float(self.time[after][outside[-1]] - self.stop) if len(outside) else 0.0
+        if not len(outside):
+            return 0.0
+        back = self.time[after][outside[-1] + 1 :]
+        return float(back[0] - self.stop) if len(back) else None
 
 
 def stretch_path(

@@ -54,11 +54,11 @@ class Sweep:
         return f"{self.offset:g} ± {self.amplitude:g}"
 
     @property
-    def bandwidth(self) -> float:
-        """Frequency at which the gain is 3 dB under that of the lowest one [Hz]."""
+    def bandwidth(self) -> float | None:
+        """Where the gain is 3 dB under that of the lowest frequency [Hz]; None past the highest."""
         below = decibel(self.gain, float(self.gain[0])) + 3.0
         if below.min() > 0:
-            return float(self.frequency[-1])
+            return None
         k = int(np.argmax(below < 0))
         share = below[k - 1] / (below[k - 1] - below[k])
         low, high = self.frequency[k - 1 : k + 1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import pi, sqrt
+from math import degrees, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,11 +110,13 @@ def second_order_response(fit: SecondOrder, time: _Values, load: _Values) -> _Va
 def swing_measures(label: str, swing: Swing) -> Iterator[Measure]:
     """What to say of a swing; ``label`` says which."""
     unturned = "" if swing.time_to_peak else "it does not turn within the run"
-    yield Measure(f"peak deflection, {label}", swing.peak, "rad", note=unturned)
+    yield Measure(f"peak deflection, {label}", degrees(swing.peak), "°", note=unturned)
     yield Measure(f"time to peak, {label}", swing.time_to_peak, "s", note=unturned)
     yield Measure(f"stiffness K, {label}", swing.stiffness, "N·m/rad")
     yield Measure(f"viscosity B, {label}", swing.damping, "N·m·s/rad")
-    yield Measure(f"inertia J, found, {label}", swing.found_inertia, "kg·m²")
+    found = swing.found_inertia if swing.found_inertia > 0 else None
+    none = "" if found else "the fit that may choose it finds none above 0"
+    yield Measure(f"inertia J, found, {label}", found, "kg·m²", note=none)
     yields = "" if swing.stiffness > 0 else "the fitted stiffness is not positive"
     yield Measure(f"natural frequency, {label}", swing.natural_frequency, "Hz", note=yields)
     yield Measure(f"damping ratio, {label}", swing.damping_ratio, "-", note=yields)

@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from mjhill.comparison.responses import time_to
+from mjhill.experiments.bench.posture import holding
 from mjhill.experiments.bench.rig import (
     Rig,
     UnmeasuredError,
     angles,
     antagonist,
     direction,
-    holding,
     rig,
     run,
     still,
