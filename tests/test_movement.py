@@ -159,17 +159,48 @@ def test_two_measurements_tell_more_than_one(subject):
         assert two.high - two.low < 1.05 * (one.high - one.low), one.name
 
 
+def test_each_measurement_may_be_predicted_in_its_own_way(subject):
+    clamp = held(subject)
+    movement = measured(noisy(moved(subject)))
+    _, predictions = from_measurements(
+        "elbow", [movement, clamp, clamp], only=["damping"], predict=["angle", "torque", "torque"]
+    )
+    assert [p.quantity for p in predictions] == ["angle", "torque", "torque"]
+
+
 def test_times_may_be_uneven(subject):
     random = np.random.default_rng(2)
     recording = noisy(moved(subject))
     kept = np.sort(random.choice(np.arange(1, len(recording)), 400, replace=False))
-    # the inputs hold from sample to sample, so their jumps are kept
+    # the inputs go straight from sample to sample, so both ends of their jumps are kept
     jumps = [0, 99, 100, 399, 400, 599, 600, 699, 700, len(recording) - 1]
     result, (prediction,) = from_measurements(
         "elbow", [measured(recording, np.union1d(kept, jumps))], only=INFORMED
     )
     assert prediction.error == pytest.approx(NOISE, rel=0.1)
     check(result, subject, INFORMED)
+
+
+def test_inputs_go_straight_between_samples(subject):
+    # held from sample to sample, 100 Hz would lengthen the time constants by 5 ms
+    smooth = mjhill.Signal(lambda t: 0.25 - 0.25 * np.cos(12 * t))
+    movement = moved(subject, excitation={"elbow_flexor": smooth}, torque=smooth)
+    recording = noisy(movement, noise=1e-4)
+    name = "elbow_flexor.excitation_tau"
+    result, _ = from_measurements(
+        "elbow", [measured(recording, slice(None, None, 10))], only=(*INFORMED, name)
+    )
+    check(result, subject, [name])
+
+
+def test_the_intervals_of_a_muscle_at_rest_hold_what_agrees_as_well(subject):
+    # a resting extensor drags a fast flexion only if it is slow enough, so its covariance
+    # depends on where the solution happens to be; the true one is at the slow end of the bounds
+    resting = "elbow_extensor.max_velocity"
+    result, _ = from_measurements("elbow", [measured(noisy(moved(subject)))], only=(*ONLY, resting))
+    estimate = next(e for e in result.estimates if e.name == resting)
+    assert estimate.low <= subject.muscles["elbow_extensor"].max_velocity <= estimate.high
+    assert estimate.informed < 0.8  # 0.93 by the covariance
 
 
 def test_a_measurement_may_begin_with_a_gap(subject):
@@ -218,6 +249,8 @@ def still_life(**changes):
         ({"joint": "wing"}, "unknown joint 'wing'; there are: elbow"),
         ({"only": ["strength"]}, "elbow: unknown free parameter 'strength'; there are: damping"),
         ({"predict": "force"}, "predict must be one of angle, torque, got 'force'"),
+        ({"only": ["postures.elbow_flexor"]}, "unknown free parameter 'postures.elbow_flexor'"),
+        ({"predict": ["angle"] * 2}, "once, or once for each of the 1 measurements, got 2: angle"),
         ({"measurements": []}, "there is no measurement to fit; give at least one"),
         ({"predict": "angle"}, "still.csv: the angle never changes, so there is nothing to pred"),
         ({}, "still.csv: the torque never changes, so there is nothing to predict"),

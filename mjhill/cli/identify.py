@@ -21,8 +21,9 @@ _HIDDEN = ("note", "source", "muscle")  # from tables on the screen; the JSON fi
     help="A measurement of the one joint named, .csv; may be given several times.",
 )  # fmt: skip
 @click.option(
-    "--predict", type=click.Choice(["angle", "torque"]),
-    help="What to compare with the data; by default torque where the joint is held still.",
+    "--predict", multiple=True, type=click.Choice(["angle", "torque"]),
+    help="What to compare with the data, once for all or once for each; by default torque where "
+    "the joint is held still, angle elsewhere.",
 )  # fmt: skip
 @click.option("--fit", "only", multiple=True, metavar="NAME", help="Fit only this parameter.")
 @click.option(
@@ -37,7 +38,7 @@ _HIDDEN = ("note", "source", "muscle")  # from tables on the screen; the JSON fi
 def identify(
     joints: tuple[str, ...],
     data: tuple[Path, ...],
-    predict: str | None,
+    predict: tuple[str, ...],
     only: tuple[str, ...],
     parameters: Path | None,
     output: Path,
@@ -47,8 +48,9 @@ def identify(
 
     Without --data: to Table 2 of Winters & Stark (1987) and published passive torques and
     ranges of motion, for all joints if none is named. With --data: to measurements of one joint,
-    CSV files with columns time [s], angle [rad or deg], torque [N·m, external] and one of each
-    muscle's name [0 to 1].
+    CSV files with columns time [s], angle [rad or deg], torque [N·m] and one of each muscle's
+    name [0 to 1]. The torque is all that acts on the joint from outside, gravity too, and is
+    positive towards positive angles.
     """
     if data and len(joints) != 1:
         raise ValueError(f"name the one joint that was measured, got {len(joints)}")
@@ -123,7 +125,7 @@ def _published(names: list[str], parameters: Path | None, files: dict[str, Path]
 def _measured(
     name: str,
     data: tuple[Path, ...],
-    predict: str | None,
+    predict: tuple[str, ...],
     only: tuple[str, ...],
     parameters: Path | None,
     files: dict[str, Path],
@@ -140,7 +142,7 @@ def _measured(
     measurements = [read_measurement(path, joint) for path in data]
     with progress_bar(f"fitting {name}") as progress:
         result, predictions = from_measurements(
-            name, measurements, predict=predict, only=only, parameters=parameters,
+            name, measurements, predict=predict or None, only=only, parameters=parameters,
             progress=progress,
         )  # fmt: skip
     write_parameters(files["parameters"], [result], parameters)

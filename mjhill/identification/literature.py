@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mjhill.identification.evidence import Evidence, evidence_on
 from mjhill.identification.free import free_parameters, joint_at
 from mjhill.identification.identified import Identified
+from mjhill.identification.intervals import intervals
 from mjhill.identification.solve import solve
 from mjhill.joints import read_joints
 from mjhill.parameters import Joint
@@ -34,9 +38,14 @@ def from_literature(
     free = free_parameters(joint, parameters)
     start = read_joints(parameters)[joint]
     evidence = _evidence(start)
-    solution = solve(lambda points: evidence.residuals(free, points), len(free), progress)
+
+    def residuals(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return evidence.residuals(free, points)
+
+    solution = solve(residuals, len(free), progress)
+    ends = intervals(residuals, solution, len(free))
     fitted = joint_at(start, free, solution.deviations)
-    return Identified(fitted, tuple(free), tuple(solution.estimates(free)))
+    return Identified(fitted, tuple(free), tuple(solution.estimates(free, ends)))
 
 
 def check_evidence(joints: Iterable[str], parameters: str | Path | None = None) -> None:

@@ -139,6 +139,6 @@ two causes. Table 2 wants slow joints: at 50 % input its time constants leave no
 largest velocities that others report. And the input of a twitch or a small saccade is one short
 pulse of at most 1, through the time constants of eq. 12.""",
     "Parameters": """SI units. The interval holds the value with 95 % confidence, given the bounds,
-the data and their stated errors; `from the data` is the share of the prior's variance that the
-data took away.""",
+the data and their stated errors, and that the model is right; `from the data` is the share of the
+prior's variance that the data took away, by the width of the interval.""",
 }

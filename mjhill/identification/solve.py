@@ -18,6 +18,7 @@ from mjhill.identification.free import DEVIATIONS, Free
 _DIFFERENCE = 1e-5  # of a parameter, in its standard deviations, for derivatives
 _ITERATIONS = 200
 _NEAR = 1e-6  # of a bound, in standard deviations
+CONFIDENT = 1.96  # standard deviations to either side that hold 95 % of a normal distribution
 
 # residuals at K points, (P, K) -> (R, K), each in units of its own standard deviation
 Residuals = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -31,11 +32,11 @@ class Estimate:
         name: Its name, such as ``elbow_flexor.max_velocity``.
         value: Its value, in the parameter's unit.
         low: Lower end of the interval that holds it with 95 % confidence, given the bounds,
-            the data and their stated errors.
+            the data and their errors, and that the model is right.
         high: Upper end.
         bounds: What physiology allows.
-        informed: Share of the prior's variance that the data took away, 0 to 1: near 0 the value
-            is the prior's, near 1 the data's.
+        informed: Share of the prior's variance that the data took away, 0 to 1, from the width of
+            the interval: near 0 the value is the prior's, near 1 the data's.
         at_bound: Whether it ended on a bound.
     """
 
@@ -55,31 +56,56 @@ class Solution:
     Attributes:
         deviations: Shape (P,).
         covariance: Of the deviations, shape (P, P); linear about the solution.
+        jacobian: Slopes of the residuals, then of the priors, shape (R + P, P).
         cost: Half the sum of squares, priors included.
     """
 
     deviations: NDArray[np.float64]
     covariance: NDArray[np.float64]
+    jacobian: NDArray[np.float64]
     cost: float
 
-    def estimates(self, free: Sequence[Free]) -> list[Estimate]:
-        """The parameters with their confidence."""
-        spreads = np.sqrt(np.diag(self.covariance)).tolist()
-        known = zip(self.deviations.tolist(), spreads, strict=True)
-        # what was fitted besides, such as where a trial starts, comes after the parameters
-        return [_estimate(item, z, spread) for item, (z, spread) in zip(free, known, strict=False)]
+    @property
+    def ends(self) -> NDArray[np.float64]:
+        """Ends of the intervals of 95 % by the covariance, in deviations, shape (P, 2)."""
+        reach = CONFIDENT * np.sqrt(np.diag(self.covariance))
+        return np.stack([self.deviations - reach, self.deviations + reach], axis=1)
+
+    def estimates(
+        self, free: Sequence[Free], ends: NDArray[np.float64] | None = None
+    ) -> list[Estimate]:
+        """The parameters with their confidence.
+
+        Args:
+            free: The parameters; what was fitted besides, such as where a trial starts, comes
+                after them in the solution.
+            ends: Ends of their intervals in deviations, by default those of the covariance.
+        """
+        known = self.ends if ends is None else ends
+        return [
+            _estimate(item, z, low, high)
+            for item, z, (low, high) in zip(
+                free, self.deviations.tolist(), known.tolist(), strict=False
+            )
+        ]
 
 
-def _estimate(free: Free, deviation: float, spread: float) -> Estimate:
+def _estimate(free: Free, deviation: float, low: float, high: float) -> Estimate:
+    spread = (high - low) / (2 * CONFIDENT)
     return Estimate(
         free.name,
         free.value(deviation),
-        free.value(deviation - 1.96 * spread),
-        free.value(deviation + 1.96 * spread),
+        free.value(low),
+        free.value(high),
         (free.low, free.high),
         max(0.0, 1.0 - spread**2),
         abs(deviation) > DEVIATIONS - _NEAR,
     )
+
+
+def with_priors(residuals: Residuals) -> Residuals:
+    """Residuals and, after them, the deviations themselves, which the priors want to be zero."""
+    return lambda points: np.concatenate([residuals(points), points])
 
 
 def solve(
@@ -99,9 +125,7 @@ def solve(
     Raises:
         RuntimeError: The solver stopped short of an optimum.
     """
-
-    def all_residuals(points: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.concatenate([residuals(points), points])
+    all_residuals = with_priors(residuals)
 
     def report(trace: list[mujoco.minimize.IterLog]) -> None:
         if progress:
@@ -125,4 +149,4 @@ def solve(
         all_residuals, point, found, np.float64(_DIFFERENCE), 0, [b.reshape(-1, 1) for b in bounds]
     )
     covariance = np.linalg.inv(jacobian.T @ jacobian)
-    return Solution(point[:, 0], covariance, 0.5 * float((found**2).sum()))
+    return Solution(point[:, 0], covariance, jacobian, 0.5 * float((found**2).sum()))

@@ -120,15 +120,15 @@ def make_trial(joint: Joint, measurement: Measurement, predict: str | None = Non
     timestep = min(_LONGEST_STEP, float(np.median(np.diff(time))))
     steps = int(np.ceil(time[-1] / timestep - 1e-6))  # free of rounding
     grid: _Values = np.arange(steps + 1, dtype=np.float64) * timestep
-    latest = np.searchsorted(time, grid + 1e-9, side="right") - 1
-    excitation = np.stack([measurement.excitation[name] for name in joint.muscles], axis=1)
+    inputs = [measurement.excitation[name] for name in joint.muscles]
     return Trial(
         measurement,
         quantity,
         time,
         grid,
-        excitation[latest],
-        measurement.torque[latest],
+        # held instead, samples would come half an interval late: 5 ms at 100 Hz
+        np.stack([np.interp(grid, time, values) for values in inputs], axis=1),
+        np.interp(grid, time, measurement.torque),
         _smooth_path(time, measurement.angle, grid) if quantity == "torque" else None,
         *_start(time, measurement.angle),
     )
