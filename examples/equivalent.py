@@ -20,7 +20,7 @@ def main(path: str = "equivalent.png") -> None:
     figure.savefig(path, dpi=110)
     for measure in result.measures():
         if measure.name.startswith("equivalent"):
-            print(f"{measure.name} {measure.value:.3g} {measure.unit}")
+            print(f"{measure.name} {measure.value:.4g} {measure.unit}")
     for claim in result.claims():
         print(claim.sentence, claim.evidence)
 
