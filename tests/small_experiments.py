@@ -55,8 +55,8 @@ class Rise(Result):
         return self.run
 
 
-def rise(joint="elbow", *, level=0.5, duration=0.05, clamped=False, progress=None):
-    bench = rig(JOINTS[joint], clamped=clamped)
+def rise(joint="elbow", *, level=0.5, duration=0.05, exact=False, progress=None):
+    bench = rig(JOINTS[joint], exact=exact)
     muscle = next(iter(JOINTS[joint].muscles))
     start = still(bench, strongest_angle(JOINTS[joint], muscle))
     recording = run(bench, start, duration, excitation={muscle: level})

@@ -54,7 +54,7 @@ def test_each_part_leaves_numbers_figure_and_film(finished):
     films = {"rise-elbow.mp4", "rise-eye.mp4"}
     assert set(made(folder)) == files | films | {"report.html", "report.json"}
     numbers = json.loads((folder / "rise-elbow.json").read_text())
-    assert numbers["options"] == {"level": 0.5, "duration": 0.05, "clamped": False}
+    assert numbers["options"] == {"level": 0.5, "duration": 0.05, "exact": False}
     assert numbers["measures"][2]["value"] is None
     assert numbers["seconds"] > 0
     assert all((folder / film).stat().st_size < 200_000 for film in films)

@@ -123,7 +123,7 @@ def solve(
         start: Deviations to start from, shape (P,); by default the middles of the bounds.
 
     Raises:
-        RuntimeError: The solver stopped short of an optimum.
+        RuntimeError: The fit did not settle.
     """
     all_residuals = with_priors(residuals)
 

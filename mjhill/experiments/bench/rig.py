@@ -24,7 +24,6 @@ from mjhill.run import record
 from mjhill.signals import Signal
 from mjhill.spec import joint_spec
 
-_CLAMP = 1e9  # armature of a held joint [kg·m²]: no muscle turns it by a microradian in a second
 _TIMESTEPS = {"eye": 0.5e-3}  # [s]; its inertia and damping make it ten times as fast
 _TIMESTEP = 1e-3  # of every other joint [s]
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS  # time, angle, velocity, then the muscles' states
@@ -113,7 +112,7 @@ class Spring:
     rest: float
 
 
-def dynamometer(joint: Joint, frequency: float = 40.0) -> Dynamometer:
+def dynamometer(joint: Joint, frequency: float) -> Dynamometer:
     """A dynamometer on whose coupling the joint rings at a frequency [Hz], critically damped."""
     pulsation = 2 * pi * frequency
     return Dynamometer(joint.inertia * pulsation**2, 2 * joint.inertia * pulsation)
@@ -122,7 +121,6 @@ def dynamometer(joint: Joint, frequency: float = 40.0) -> Dynamometer:
 def rig(
     joint: Joint,
     *,
-    clamped: bool = False,
     exact: bool = False,
     machine: Dynamometer | None = None,
     spring: Spring | None = None,
@@ -132,7 +130,6 @@ def rig(
 
     Args:
         joint: The joint.
-        clamped: Whether it cannot move at all, so that its muscles are isometric.
         exact: Whether to integrate by RK4; the half step by which Euler's method is early takes
             half a step's worth of stiffness off the damping that a fit finds.
         machine: A dynamometer on the joint; the joint is then integrated by implicitfast, which
@@ -154,8 +151,6 @@ def rig(
         )
     if exact:
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    if clamped:
-        spec.joints[0].armature = _CLAMP
     with without_python_callbacks():
         return Rig(joint, spec.compile())
 
