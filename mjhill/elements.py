@@ -62,8 +62,8 @@ def contractile_velocity(
     plateau: float,
     slope_ratio: float,
     viscosity: float,
-) -> tuple[float, float, float]:
-    """Shortening velocity of the contractile element under a force, and its slope as a ratio.
+) -> tuple[float, float, float, float]:
+    """Shortening velocity of the contractile element under a force, and its slopes as ratios.
 
     Shortening: force = H hill (1 - v)/(hill + v) - viscosity v, Hill's relation (eqs. 3-5)
     with H the hypothetical force. Lengthening at w = -v: force = H (1 + (plateau - 1) w/(w + c))
@@ -72,15 +72,16 @@ def contractile_velocity(
     plateau a finite slope. Either branch is a quadratic in the velocity.
 
     Returns:
-        velocity [V_max], positive when shortening; then two positive numbers p and q such that
-        d velocity/d force = -p/q [V_max/F_max]: the caller divides by more, and only once.
+        velocity [V_max], positive when shortening; then three numbers p > 0, q > 0 and r such
+        that d velocity/d force = -p/q and d velocity/d hypothetical = r/q [V_max/F_max]: the
+        caller divides by more, and only once.
     """
     deficit = hypothetical - force
     if deficit >= 0:
         linear = force + hypothetical * hill + viscosity * hill
         root = sqrt(linear * linear + 4 * viscosity * hill * deficit)
         velocity = 2 * hill * deficit / (linear + root)
-        return velocity, velocity + hill, root
+        return velocity, velocity + hill, root, hill * (1 - velocity)
     excess = -deficit
     c = (plateau - 1) * hill / ((1 + hill) * slope_ratio)
     linear = hypothetical * (plateau - 1) + viscosity * c - excess
@@ -89,7 +90,7 @@ def contractile_velocity(
         lengthening = 2 * c * excess / (linear + root)
     else:
         lengthening = (root - linear) / (2 * viscosity)
-    return -lengthening, lengthening + c, root
+    return -lengthening, lengthening + c, root, c + plateau * lengthening
 
 
 def series_force(

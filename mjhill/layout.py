@@ -67,6 +67,7 @@ RATE_PARAMETERS = (
     "viscosity",
     "velocity_activation",
 )
+STRETCH_PARAMETERS = RATE_PARAMETERS[4:]  # those of ``scheme.present_stretch``
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ def isometric_share(muscle: Muscle, activation: float, length: float) -> float:
 def shortening_velocity(muscle: Muscle, activation: float, length: float, stretch: float) -> float:
     """Velocity of the contractile element [rad/s or m/s], positive when it shortens."""
     hypothetical = isometric_share(muscle, activation, length)
-    velocity, _, _ = contractile_velocity(
+    velocity, _, _, _ = contractile_velocity(
         tension(muscle, stretch) / muscle.max_isometric_force,
         hypothetical,
         muscle.hill_shape,

@@ -1,4 +1,4 @@
-"""The same joint solved by SciPy's stiff solver: the yardstick for the MuJoCo path.
+"""The same equations solved by SciPy's stiff solvers: what the MuJoCo path is measured against.
 
 No MuJoCo in here: only the equations and the parameters.
 """
@@ -6,127 +6,149 @@ No MuJoCo in here: only the equations and the parameters.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.elements import activation_rate, excitation_rate, passive_torque
-from mjhill.parameters import Joint
+from mjhill.elements import (
+    activation_rate,
+    active_length_factor,
+    contractile_velocity,
+    excitation_rate,
+    hypothetical_force,
+    passive_torque,
+    series_force,
+    velocity_scale,
+)
+from mjhill.parameters import Joint, Muscle
 from mjhill.readings import shortening_velocity, steady_stretch, tension
 from mjhill.recording import Recording
 from mjhill.signals import Signal, as_signal, as_signals
+from mjhill.system import Coordinate, Movement, System
+
+Solver = Literal["Radau", "LSODA"]
 
 _Vector = NDArray[np.float64]
+_Rates = Callable[[float, list[float]], list[float]]
 
 
 def simulate(
-    joint: Joint,
+    system: Joint | System,
     excitation: Mapping[str, Signal | float],
     *,
-    torque: Signal | float = 0.0,
+    torque: Mapping[str, Signal | float] | Signal | float = 0.0,
+    movement: Mapping[str, Movement] | None = None,
     duration: float,
     start: _Vector | None = None,
     sample: float = 1e-3,
     rtol: float = 1e-9,
     atol: float = 1e-11,
+    solver: Solver = "Radau",
 ) -> Recording:
-    """Solve the eight equations of a joint and its two muscles.
+    """Solve the equations of a joint and its two muscles, or of any system.
 
-    Implicit Runge-Kutta of order 5 (SciPy's Radau), restarted wherever an input jumps.
+    Restarted wherever an input jumps.
 
     Args:
-        joint: The joint.
+        system: The joint or system.
         excitation: Neural input of each muscle, by name; a muscle not named gets 0.
-        torque: External torque [N·m].
+        torque: External torque [N·m] or force [N] by coordinate; one value serves a joint.
+        movement: Movements of coordinates that are prescribed, by name; the others are free.
         duration: Length of the run [s].
-        start: State at time 0, shape (8,): angle, velocity, then n, a, s of each muscle; by
-            default ``rest_state(joint)``.
+        start: State at time 0: position and velocity of each coordinate, then n, a, s of each
+            muscle; by default ``rest_state(system)``.
         sample: Interval of the recording [s].
         rtol: Relative tolerance of each step.
         atol: Absolute tolerance of each step.
+        solver: SciPy's solver: ``"Radau"`` (implicit Runge-Kutta of order 5) or ``"LSODA"``
+            (multistep, several times faster).
 
     Returns:
-        The recording, with the names that ``mjhill.record`` gives.
+        The recording, with the names that ``mjhill.record`` gives; ``velocity`` of a muscle is
+        the present one.
 
     Raises:
-        ValueError: A muscle is unknown, or a number is not positive or not finite.
+        ValueError: A name is unknown, or a number is not positive or not finite.
         RuntimeError: The solver gave up.
     """
     for what, value in (("duration", duration), ("sample", sample)):
         if not (np.isfinite(value) and value > 0):
             raise ValueError(f"{what} must be positive, got {value}")
-    inputs = as_signals(excitation, joint.muscles, "muscle")
-    inputs = {name: inputs.get(name, as_signal(0.0)) for name in joint.muscles}
-    load = as_signal(torque)
+    whole = System.of(system) if isinstance(system, Joint) else system
+    inputs = as_signals(excitation, whole.muscles, "muscle")
+    inputs = {name: inputs.get(name, as_signal(0.0)) for name in whole.muscles}
+    loads = _loads(whole, torque)
+    movements = _known_movements(whole, movement or {})
     times: _Vector = np.arange(round(duration / sample) + 1, dtype=np.float64) * sample
-    knots = _knots([*inputs.values(), load], float(times[-1]))
-    state = rest_state(joint) if start is None else np.array(start, dtype=np.float64)
+    jumps = [*inputs.values(), *loads.values(), *movements.values()]
+    knots = _knots((item.breaks for item in jumps), float(times[-1]))
+    state = rest_state(system) if start is None else np.array(start, dtype=np.float64)
     states = np.empty((len(times), len(state)))
     states[0] = state
     for begin, end in itertools.pairwise(knots):
         fuzz = 1e-9 * sample
         inside = (times > begin + fuzz) & (times <= end + fuzz)
-        rates = _rates(joint, inputs, load, begin, end)
-        solution = _solve(rates, begin, end, state, times[inside], rtol, atol)
+        rates = _rates(whole, inputs, loads, movements, begin, end)
+        solution = _solve(rates, begin, end, state, times[inside], rtol, atol, solver)
         states[inside] = solution[:, : inside.sum()].T
         state = solution[:, -1]
-    return _recorded(joint, inputs, load, times, states)
+    for index, name in enumerate(whole.coordinates):
+        if name in movements:
+            states[:, 2 * index] = [movements[name].position(time) for time in times]
+            states[:, 2 * index + 1] = [movements[name].velocity(time) for time in times]
+    return _recorded(whole, inputs, loads, times, states, solver)
 
 
 def rest_state(
-    joint: Joint, angle: float | None = None, excitation: Mapping[str, float] | None = None
+    system: Joint | System,
+    angle: float | Mapping[str, float] | None = None,
+    excitation: Mapping[str, float] | None = None,
 ) -> _Vector:
-    """State of a joint held still at an angle, its muscles steady, shape (8,).
+    """State of a joint or system held still, its muscles steady.
 
     Args:
-        joint: The joint.
-        angle: The angle [rad]; by default the joint's home angle.
+        system: The joint, or the system.
+        angle: The position [rad or m], by coordinate or one for all; by default the joint's
+            home angle, or the rest position of each coordinate.
         excitation: Steady input of each muscle; by default 0.
+
+    Returns:
+        Position and velocity of each coordinate, then n, a, s of each muscle.
     """
-    theta = joint.home_angle if angle is None else angle
-    state = [theta, 0.0]
-    for name, muscle in joint.muscles.items():
+    if isinstance(system, Joint):
+        angle = system.home_angle if angle is None else angle
+        system = System.of(system)
+    if isinstance(angle, Mapping):
+        positions = dict(angle)
+    else:
+        positions = {
+            name: coordinate.rest if angle is None else float(angle)
+            for name, coordinate in system.coordinates.items()
+        }
+    state: list[float] = []
+    for name in system.coordinates:
+        state += [positions[name], 0.0]
+    for name, muscle in system.muscles.items():
         u = (excitation or {}).get(name, 0.0)
-        length = joint.gears[name] * theta
+        length = system.length(name, positions)
         state += [u, u, length - steady_stretch(muscle, u, length)]
     return np.array(state)
 
 
-def _rates(
-    joint: Joint, inputs: Mapping[str, Signal], load: Signal, begin: float, end: float
-) -> Callable[[float, _Vector], _Vector]:
-    """The right-hand side between two jumps of the inputs."""
-
-    def rates(time: float, state: _Vector) -> _Vector:
-        # an input that jumps at the end of the interval keeps its value from inside
-        now = min(max(time, begin), end - 1e-9 * (end - begin))
-        theta, velocity, *muscles = state.tolist()
-        total = load(now) - joint.damping * velocity + plant_torque(joint, theta)
-        result = [velocity, 0.0]
-        for index, (name, muscle) in enumerate(joint.muscles.items()):
-            n, a, s = muscles[3 * index : 3 * index + 3]
-            source = inputs[name](now) if muscle.electrical_stimulation else n
-            length = joint.gears[name] * theta
-            result += [
-                excitation_rate(inputs[name](now), n, muscle.excitation_tau),
-                activation_rate(source, a, muscle.activation_tau, muscle.deactivation_tau),
-                -shortening_velocity(muscle, a, length, length - s),
-            ]
-            total -= joint.gears[name] * tension(muscle, length - s)
-        result[1] = total / joint.inertia
-        return np.array(result)
-
-    return rates
-
-
 def plant_torque(joint: Joint, angle: float) -> float:
     """Torque of a joint's passive elasticity at an angle [N·m]."""
-    passive = joint.passive
+    return _passive(System.of(joint).coordinates[joint.name], angle)
+
+
+def _passive(coordinate: Coordinate, position: float) -> float:
+    passive, deviation = coordinate.passive, position - coordinate.rest
+    if passive is None:
+        return -coordinate.stiffness * deviation
     return passive_torque(
-        angle - joint.rest_angle,
-        joint.stiffness,
+        deviation,
+        coordinate.stiffness,
         passive.k1_pos,
         passive.k2_pos,
         passive.k1_neg,
@@ -135,31 +157,131 @@ def plant_torque(joint: Joint, angle: float) -> float:
     )
 
 
-def _knots(signals: list[Signal], end: float) -> list[float]:
+def _loads(
+    system: System, torque: Mapping[str, Signal | float] | Signal | float
+) -> dict[str, Signal]:
+    """The external torque of every coordinate."""
+    if not isinstance(torque, Mapping):
+        if len(system.coordinates) > 1 and torque != 0.0:
+            known = ", ".join(system.coordinates)
+            raise ValueError(f"torque must be given by coordinate; there are: {known}")
+        torque = dict.fromkeys(system.coordinates, torque)
+    given = as_signals(torque, system.coordinates, "coordinate")
+    return {name: given.get(name, as_signal(0.0)) for name in system.coordinates}
+
+
+def _known_movements(system: System, movement: Mapping[str, Movement]) -> dict[str, Movement]:
+    for name in movement:
+        if name not in system.coordinates:
+            known = ", ".join(system.coordinates)
+            raise ValueError(f"unknown coordinate {name!r}; there are: {known}")
+    return dict(movement)
+
+
+def _rates(
+    system: System,
+    inputs: Mapping[str, Signal],
+    loads: Mapping[str, Signal],
+    movements: Mapping[str, Movement],
+    begin: float,
+    end: float,
+) -> _Rates:
+    """The right-hand side between two jumps of the inputs."""
+    order = {name: index for index, name in enumerate(system.coordinates)}
+    muscles = [
+        (inputs[name], muscle, [(order[joint], arm) for joint, arm in system.arms[name].items()])
+        for name, muscle in system.muscles.items()
+    ]
+    coordinates = [
+        (coordinate, loads[name], movements.get(name))
+        for name, coordinate in system.coordinates.items()
+    ]
+    last = end - 1e-9 * (end - begin)
+
+    def rates(time: float, state: list[float]) -> list[float]:
+        # an input that jumps at the end of the interval keeps its value from inside
+        now = min(max(time, begin), last)
+        result, forces, positions = [], [], []
+        for index, (coordinate, load, movement) in enumerate(coordinates):
+            position, velocity = state[2 * index], state[2 * index + 1]
+            if movement is not None:
+                position, velocity = movement.position(time), movement.velocity(time)
+            positions.append(position)
+            forces.append(
+                load(now) - coordinate.damping * velocity + _passive(coordinate, position)
+            )
+            result += [velocity, 0.0]
+        first = 2 * len(coordinates)
+        for index, (signal, muscle, arms) in enumerate(muscles):
+            n, a, s = state[first + 3 * index : first + 3 * index + 3]
+            length = sum([arm * positions[joint] for joint, arm in arms])
+            rows, force = _muscle_rates(muscle, signal(now), n, a, s, length)
+            result += rows
+            for joint, arm in arms:
+                forces[joint] -= arm * force
+        for index, (coordinate, _, movement) in enumerate(coordinates):
+            if movement is None:
+                result[2 * index + 1] = forces[index] / coordinate.inertia
+        return result
+
+    return rates
+
+
+def _muscle_rates(
+    muscle: Muscle, u: float, n: float, a: float, s: float, length: float
+) -> tuple[list[float], float]:
+    """Rates of n, a and s, and the muscle's tension."""
+    force, _ = series_force(
+        length - s, muscle.series_stretch, muscle.series_shape, muscle.series_limit
+    )
+    factor = active_length_factor(
+        length, muscle.optimal_length, muscle.width_short, muscle.width_long
+    )
+    hypothetical = hypothetical_force(a, factor, muscle.activation_floor)
+    velocity, _, _, _ = contractile_velocity(
+        force,
+        hypothetical,
+        muscle.hill_shape,
+        muscle.eccentric_plateau,
+        muscle.eccentric_slope_ratio,
+        muscle.viscosity,
+    )
+    velocity *= muscle.max_velocity * velocity_scale(hypothetical, muscle.velocity_activation)
+    source = u if muscle.electrical_stimulation else n
+    rates = [
+        excitation_rate(u, n, muscle.excitation_tau),
+        activation_rate(source, a, muscle.activation_tau, muscle.deactivation_tau),
+        -velocity,
+    ]
+    return rates, muscle.max_isometric_force * force
+
+
+def _knots(breaks: Iterable[tuple[float, ...]], end: float) -> list[float]:
     """Times of restart: 0, every jump inside the run, its end; sums of inputs may repeat one."""
     knots = [0.0]
-    for time in sorted(time for signal in signals for time in signal.breaks):
+    for time in sorted(itertools.chain.from_iterable(breaks)):
         if knots[-1] + 1e-9 < time < end - 1e-9:
             knots.append(time)
     return [*knots, end]
 
 
 def _solve(
-    rates: Callable[[float, _Vector], _Vector],
+    rates: _Rates,
     begin: float,
     end: float,
     state: _Vector,
     times: _Vector,
     rtol: float,
     atol: float,
+    solver: Solver,
 ) -> Any:
     from scipy.integrate import solve_ivp
 
     result = solve_ivp(
-        rates,
+        lambda time, values: rates(time, values.tolist()),
         (begin, end),
         state,
-        method="Radau",
+        method=solver,
         t_eval=np.unique(np.append(np.minimum(times, end), end)),
         rtol=rtol,
         atol=atol,
@@ -171,30 +293,42 @@ def _solve(
 
 
 def _recorded(
-    joint: Joint,
+    system: System,
     inputs: Mapping[str, Signal],
-    load: Signal,
+    loads: Mapping[str, Signal],
     times: _Vector,
     states: _Vector,
+    solver: Solver,
 ) -> Recording:
-    series = {f"{joint.name}.angle": states[:, 0], f"{joint.name}.velocity": states[:, 1]}
-    units = {f"{joint.name}.angle": "rad", f"{joint.name}.velocity": "rad/s"}
-    series[f"{joint.name}.applied"] = np.array([load(time) for time in times])
-    units[f"{joint.name}.applied"] = "N·m"
-    for index, (name, muscle) in enumerate(joint.muscles.items()):
-        n, a, s = states[:, 2 + 3 * index : 5 + 3 * index].T
-        length = joint.gears[name] * states[:, 0]
+    series: dict[str, _Vector] = {}
+    units: dict[str, str] = {}
+    for index, (name, coordinate) in enumerate(system.coordinates.items()):
+        position, unit = ("position", "m") if coordinate.slide else ("angle", "rad")
+        series[f"{name}.{position}"], units[f"{name}.{position}"] = states[:, 2 * index], unit
+        series[f"{name}.velocity"] = states[:, 2 * index + 1]
+        units[f"{name}.velocity"] = f"{unit}/s"
+    for name, load in loads.items():
+        series[f"{name}.applied"] = np.array([load(time) for time in times])
+        units[f"{name}.applied"] = "N" if system.coordinates[name].slide else "N·m"
+    order = {name: 2 * index for index, name in enumerate(system.coordinates)}
+    first = 2 * len(system.coordinates)
+    for index, (name, muscle) in enumerate(system.muscles.items()):
+        n, a, s = states[:, first + 3 * index : first + 3 * index + 3].T
+        length = sum(arm * states[:, order[joint]] for joint, arm in system.arms[name].items())
         rows = list(zip(a.tolist(), length.tolist(), (length - s).tolist(), strict=True))
+        unit, effort = ("m", "N") if system.slides(name) else ("rad", "N·m")
         columns = {
             "u": ("-", np.array([inputs[name](time) for time in times])),
             "n": ("-", n),
             "a": ("-", a),
-            "velocity": ("rad/s", np.array([shortening_velocity(muscle, *row) for row in rows])),
-            "stretch": ("rad", length - s),
-            "force": ("N·m", np.array([tension(muscle, stretch) for _, _, stretch in rows])),
+            "velocity": (
+                f"{unit}/s",
+                np.array([shortening_velocity(muscle, *row) for row in rows]),
+            ),
+            "stretch": (unit, length - s),
+            "force": (effort, np.array([tension(muscle, stretch) for _, _, stretch in rows])),
         }
-        for quantity, (unit, values) in columns.items():
-            series[f"{name}.{quantity}"] = np.ascontiguousarray(values)
-            units[f"{name}.{quantity}"] = unit
-    about: dict[str, str | float] = {"joint": joint.name, "solver": "SciPy Radau"}
+        for quantity, (kind, values) in columns.items():
+            series[f"{name}.{quantity}"], units[f"{name}.{quantity}"] = values, kind
+    about: dict[str, str | float] = {"joint": system.name, "solver": f"SciPy {solver}"}
     return Recording(times, {k: np.ascontiguousarray(v) for k, v in series.items()}, units, about)

@@ -11,7 +11,7 @@ Pure scalar functions, under the same rules as ``elements``.
 
 from __future__ import annotations
 
-from math import exp
+from math import exp, log, sqrt
 
 from mjhill.elements import (
     activation_rate,
@@ -24,13 +24,23 @@ from mjhill.elements import (
 )
 
 
-def relaxed(p: float, q: float) -> float:
-    """(exp(z) - 1)/z at z = -p/q, for p >= 0 and q > 0, by the (1, 2) Padé approximant of exp.
+NEGLIGIBLE = 3e-3
+TOLERANCE = 1e-3  # of one substep of the stretch, in units of F_max
+PATIENCE = 30  # substeps tried, after which any is taken
 
-    The approximant is L-stable (it is that of Radau IIA), exact to z² at 0 and -1/z far from
-    it: one step of a stiff equation ends on its equilibrium.
+
+def averages(p: float, q: float) -> tuple[float, float]:
+    """Weighted averages of a decay exp(z t) over t in (0, 1), z = -p/q, for p >= 0 and q > 0.
+
+    By the (1, 2) Padé approximant of exp, that of Radau IIA: L-stable, so a step of a stiff
+    equation ends on its equilibrium.
+
+    Returns:
+        (exp(z) - 1)/z, by which a constant rate counts; (exp(z) - 1 - z)/z²/q, by which counts a
+        rate that grows from 0 linearly, given in units of 1/q.
     """
-    return q * (q + p * (1.0 / 6.0)) / (q * (q + p * (2.0 / 3.0)) + p * p * (1.0 / 6.0))
+    share = 1.0 / (q * (q + p * (2.0 / 3.0)) + p * p * (1.0 / 6.0))
+    return share * q * (q + p * (1.0 / 6.0)), share * (q * 0.5 + p * (1.0 / 6.0))
 
 
 def advance_excitation(
@@ -41,17 +51,49 @@ def advance_excitation(
     n is exact. a, of time constant tau, is exact for an n that is linear in time over the step.
     """
     n_next = u + (n - u) * exp(-dt / tau_nex)
-    decay = exp(-dt / tau)
+    decay = exp(-(dt / tau))
     settled = 1.0 - decay
     a_next = decay * a + settled * n + (n_next - n) * (1.0 - settled * tau * (1.0 / dt))
     return n_next, a_next
 
 
+def stretch_rate(
+    stretch: float,
+    length_rate: float,
+    hypothetical: float,
+    max_velocity: float,
+    share: float,
+    hill: float,
+    plateau: float,
+    slope_ratio: float,
+    viscosity: float,
+    stretch_max: float,
+    shape: float,
+    limit: float,
+) -> tuple[float, float, float, float, float, float]:
+    """Rate [length/s] of the stretch of the series element at a constant rate of length.
+
+    Returns:
+        the rate; two numbers p and q such that its derivative by the stretch is -p/q [1/s]; q times its
+        derivative by the hypothetical force; the stiffness of the series element [F_max per
+        unit of stretch] and its force [F_max].
+    """
+    force, stiffness = series_force(stretch, stretch_max, shape, limit)
+    velocity, p, q, r = contractile_velocity(
+        force, hypothetical, hill, plateau, slope_ratio, viscosity
+    )
+    speed = max_velocity * velocity_scale(hypothetical, share)
+    drift = speed * r + q * max_velocity * share * velocity
+    return length_rate + speed * velocity, speed * stiffness * p, q, drift, stiffness, force
+
+
 def advance_stretch(
     stretch: float,
     length_rate: float,
-    hypothetical: float,
+    before: float,
+    after: float,
     max_velocity: float,
+    share: float,
     hill: float,
     plateau: float,
     slope_ratio: float,
@@ -60,40 +102,134 @@ def advance_stretch(
     shape: float,
     limit: float,
     dt: float,
-    substeps: int,
 ) -> float:
-    """Stretch of the series element after dt [s] at constant length rate and active state.
+    """Stretch of the series element after dt [s] at constant length rate.
 
-    Exponential Rosenbrock-Euler. A slack element is first taken up at its constant rate, so
-    that it meets its stiffness when it is taut, not a step later.
+    The hypothetical force goes linearly from ``before`` to ``after``. Exponential
+    Rosenbrock-Euler, where the equation hardly bends within the step; else ``divided_stretch``.
     """
-    part = dt if substeps == 1 else dt / substeps
-    for _ in range(substeps):
-        left = part
-        if stretch < 0:
-            velocity, _, _ = contractile_velocity(
-                0.0, hypothetical, hill, plateau, slope_ratio, viscosity
-            )
-            rate = length_rate + max_velocity * velocity
-            if stretch + rate * part < 0:
-                stretch += rate * part
-                continue
-            left = part + stretch / rate
+    change, _, q, bend = linear_change(
+        stretch, length_rate, before, after - before, max_velocity, share, hill, plateau,
+        slope_ratio, viscosity, stretch_max, shape, limit, dt,
+    )  # fmt: skip
+    if bend < NEGLIGIBLE * q and stretch >= 0:
+        return stretch + change
+    return divided_stretch(
+        stretch, length_rate, before, after, max_velocity, share, hill, plateau, slope_ratio,
+        viscosity, stretch_max, shape, limit, dt,
+    )  # fmt: skip
+
+
+def linear_change(
+    stretch: float,
+    length_rate: float,
+    hypothetical: float,
+    gain: float,
+    max_velocity: float,
+    share: float,
+    hill: float,
+    plateau: float,
+    slope_ratio: float,
+    viscosity: float,
+    stretch_max: float,
+    shape: float,
+    limit: float,
+    dt: float,
+) -> tuple[float, float, float, float]:
+    """Change of a stretch >= 0 in dt [s] by the equation made linear, and how far that is off.
+
+    The hypothetical force rises by ``gain`` meanwhile.
+
+    Returns:
+        the change; q times the rate [length/s] that the linear equation has at its end; q; q
+        times an estimate of the change of force left out [F_max].
+    """
+    rate, p, q, drift, stiffness, force = stretch_rate(
+        stretch, length_rate, hypothetical, max_velocity, share, hill, plateau, slope_ratio,
+        viscosity, stretch_max, shape, limit,
+    )  # fmt: skip
+    constant, growing = averages(dt * p, q)
+    change = dt * (rate * constant + drift * gain * growing)
+    rise = stiffness * change
+    excess = force - hypothetical
+    # q is the force over which the slope of force-velocity changes by its own size
+    bend = (abs(rise) + abs(gain)) * abs(rise) * (2.0 + abs(change) * (shape / stretch_max))
+    if excess * (excess + rise - gain) < 0:  # the slope jumps where shortening turns to lengthening
+        bend += q * abs(rise * (slope_ratio - 1.0))
+    return change, rate * q + drift * gain - p * change, q, bend
+
+
+def divided_stretch(
+    stretch: float,
+    length_rate: float,
+    before: float,
+    after: float,
+    max_velocity: float,
+    share: float,
+    hill: float,
+    plateau: float,
+    slope_ratio: float,
+    viscosity: float,
+    stretch_max: float,
+    shape: float,
+    limit: float,
+    dt: float,
+) -> float:
+    """As ``advance_stretch``, each substep corrected from the rate at its end.
+
+    Second order, L-stable. Where the correction is large, because force leaves the eccentric
+    plateau or the element goes slack, the step is divided.
+    """
+    elapsed, part = 0.0, 1.0  # in units of dt
+    for trial in range(2 * PATIENCE):
+        now = before + (after - before) * elapsed
+        if stretch < 0:  # slack is taken up at its mean rate, to the moment it is taut
+            rate, _, _, _, _, _ = stretch_rate(
+                stretch, length_rate, 0.5 * (now + after), max_velocity, share, hill, plateau,
+                slope_ratio, viscosity, stretch_max, shape, limit,
+            )  # fmt: skip
+            left = (1.0 - elapsed) * dt
+            if stretch + rate * left < 0:
+                return stretch + rate * left
+            elapsed -= stretch / (rate * dt)
+            part = 1.0 - elapsed
             stretch = 0.0
-        force, stiffness = series_force(stretch, stretch_max, shape, limit)
-        velocity, p, q = contractile_velocity(
-            force, hypothetical, hill, plateau, slope_ratio, viscosity
-        )
-        rate = length_rate + max_velocity * velocity
-        stretch += left * rate * relaxed(left * max_velocity * stiffness * p, q)
+            continue
+        gain, time = (after - before) * part, part * dt
+        change, end, q, _ = linear_change(
+            stretch, length_rate, now, gain, max_velocity, share, hill, plateau, slope_ratio,
+            viscosity, stretch_max, shape, limit, time,
+        )  # fmt: skip
+        _, p, _, _, stiffness, _ = stretch_rate(
+            stretch, length_rate, now, max_velocity, share, hill, plateau, slope_ratio,
+            viscosity, stretch_max, shape, limit,
+        )  # fmt: skip
+        rate, new_p, new_q, _, new_stiffness, _ = stretch_rate(
+            stretch + change, length_rate, now + gain, max_velocity, share, hill, plateau,
+            slope_ratio, viscosity, stretch_max, shape, limit,
+        )  # fmt: skip
+        # what the linear equation has missed at the end of the part
+        missed = time * (rate - end / q)
+        _, growing = averages(time * p / q, 1.0)
+        _, slower = averages(time * min(p / q, new_p / new_q), 1.0)
+        error = abs(missed) * slower * max(stiffness, new_stiffness)
+        if error > TOLERANCE and trial < PATIENCE:
+            part *= max(0.1, 0.8 * sqrt(TOLERANCE / error))
+            continue
+        stretch += change + missed * growing
+        elapsed += part
+        if elapsed >= 1.0 - 1e-9:
+            return stretch
+        part = min(1.0 - elapsed, 4.0 * part) if trial < PATIENCE else 1.0 - elapsed
     return stretch
 
 
-def capped_stretch_rate(
+def staged_stretch(
     stretch: float,
     length_rate: float,
     hypothetical: float,
     max_velocity: float,
+    share: float,
     hill: float,
     plateau: float,
     slope_ratio: float,
@@ -102,18 +238,53 @@ def capped_stretch_rate(
     shape: float,
     limit: float,
     dt: float,
-) -> float:
-    """Rate of the stretch with its relaxation slowed, where it is faster, to 2/dt.
+) -> tuple[float, float]:
+    """Stretch whose force to use, and rate of the stretch, in a stage of RK4 of step dt [s].
 
-    RK4 is unstable past 2.78/dt. The equilibrium, moving or not, stays where it is, so what
-    is lost is a lag of half a step in an element that carries little force when it is fast.
+    RK4 is unstable where the stretch relaxes faster than 2.78/dt. Where it does so faster than
+    2/dt, the rate is the mean one over the time that slows it down to that, and the force is
+    that of the stretch a little later, when the lag which this adds is made up: a joint that
+    moves on feels the force of the true equation, and one that is pulled away its true impulse.
     """
-    force, stiffness = series_force(stretch, stretch_max, shape, limit)
-    velocity, p, q = contractile_velocity(
-        force, hypothetical, hill, plateau, slope_ratio, viscosity
-    )
-    p *= dt * max_velocity * stiffness
-    return (length_rate + max_velocity * velocity) * (2.0 * q / p if p > 2.0 * q else 1.0)
+    rate, p, q, _, _, _ = stretch_rate(
+        stretch, length_rate, hypothetical, max_velocity, share, hill, plateau, slope_ratio,
+        viscosity, stretch_max, shape, limit,
+    )  # fmt: skip
+    now = dt * p / q
+    _, p, q, _, _, _ = stretch_rate(
+        stretch + 0.5 * dt * rate, length_rate, hypothetical, max_velocity, share, hill, plateau,
+        slope_ratio, viscosity, stretch_max, shape, limit,
+    )  # fmt: skip
+    if now <= 2.0 and dt * p <= 2.0 * q:
+        return stretch, rate
+    settled = advance_stretch(
+        stretch, length_rate, hypothetical, hypothetical, max_velocity, share, hill, plateau,
+        slope_ratio, viscosity, stretch_max, shape, limit, 0.5 * dt,
+    )  # fmt: skip
+    _, p, q, _, _, _ = stretch_rate(
+        settled, length_rate, hypothetical, max_velocity, share, hill, plateau, slope_ratio,
+        viscosity, stretch_max, shape, limit,
+    )  # fmt: skip
+    then = dt * p / q
+    fastest = max(now, then)
+    if fastest <= 2.0:
+        return stretch, rate
+    # (1 - exp(-z t))/(z t) = 2/z, to 6 %
+    whole = 0.5 * dt * (1.0 - 4.0 / (fastest * fastest))
+    later = advance_stretch(
+        stretch, length_rate, hypothetical, hypothetical, max_velocity, share, hill, plateau,
+        slope_ratio, viscosity, stretch_max, shape, limit, whole,
+    )  # fmt: skip
+    ahead = 0.5 * dt * min(max(0.125 * (then - 2.0), 0.0), 1.0)
+    if now > 2.0:
+        ahead = max(ahead, dt * log(0.5 * now) / now)
+    present = stretch
+    if ahead > 0.0:
+        present = advance_stretch(
+            stretch, length_rate, hypothetical, hypothetical, max_velocity, share, hill, plateau,
+            slope_ratio, viscosity, stretch_max, shape, limit, ahead,
+        )  # fmt: skip
+    return present, (later - stretch) / whole
 
 
 def muscle_rates(
@@ -156,34 +327,64 @@ def muscle_rates(
     Electrical stimulation puts the input straight into activation (sect. 4.1.2).
     """
     source = u if stimulated > 0 else n
-    frequency = 1.0 / dt
+    now = hypothetical_force(
+        a, active_length_factor(length, optimal, width_short, width_long), floor
+    )
     if staged:
-        n_rate = (u - n) * frequency if stimulated > 0 else excitation_rate(u, n, tau_nex)
-        a_rate = activation_rate(source, a, tau_act, tau_deact)
-        a_then, length_then = a, length
-    else:
-        tau = tau_act if source >= a else tau_deact
-        a_then, length_then = a - 0.5 * (dt / tau) * (source - a), length - 0.5 * dt * length_rate
-        n_next, a_next = advance_excitation(u, source, a, tau_nex, tau, dt)
-        n_rate, a_rate = (n_next - n) * frequency, (a_next - a) * frequency
-    factor = active_length_factor(length_then, optimal, width_short, width_long)
-    hypothetical = hypothetical_force(a_then, factor, floor)
-    speed = max_velocity * velocity_scale(hypothetical, velocity_share)
-    if staged:
-        stretch_rate = capped_stretch_rate(
-            length - s, length_rate, hypothetical, speed, hill, plateau, slope_ratio,
-            viscosity, stretch_max, shape, limit, dt,
+        least = 0.5 * dt  # RK4 is unstable past 2.78/dt
+        n_rate = (u - n) / dt if stimulated > 0 else excitation_rate(u, n, max(tau_nex, least))
+        a_rate = activation_rate(source, a, max(tau_act, least), max(tau_deact, least))
+        _, rate = staged_stretch(
+            length - s, length_rate, now, max_velocity, velocity_share, hill, plateau,
+            slope_ratio, viscosity, stretch_max, shape, limit, dt,
         )  # fmt: skip
-        return n_rate, a_rate, length_rate - stretch_rate
-    # short steps need one substep; in long ones a second takes what there is to take
-    substeps = 2 if dt > 0.2 * tau_act else 1
+        return n_rate, a_rate, length_rate - rate
+    tau = tau_act if source >= a else tau_deact
+    n_next, a_next = advance_excitation(u, source, a, tau_nex, tau, dt)
+    length_then = length - dt * length_rate
+    a_then = a - (n - a) * (dt / tau)
+    if stimulated > 0:  # n is the input of the step before, so it can be undone exactly
+        a_then = n + (a - n) * exp(dt / (tau_act if n >= a else tau_deact))
+        a_then = min(max(a_then, 0.0), 1.0)
+    then = hypothetical_force(
+        a_then, active_length_factor(length_then, optimal, width_short, width_long), floor
+    )
     stretch = advance_stretch(
-        length - dt * length_rate - s, length_rate, hypothetical, speed, hill, plateau,
-        slope_ratio, viscosity, stretch_max, shape, limit, dt, substeps,
+        length_then - s, length_rate, then, now, max_velocity, velocity_share, hill, plateau,
+        slope_ratio, viscosity, stretch_max, shape, limit, dt,
     )  # fmt: skip
-    return n_rate, a_rate, (length - stretch - s) * frequency
+    frequency = 1.0 / dt
+    return (n_next - n) * frequency, (a_next - a) * frequency, (length - stretch - s) * frequency
 
 
-def present_length(staged: bool, s: float, s_rate: float, dt: float) -> float:
-    """Length of the contractile element now, from its state and rate; see ``muscle_rates``."""
-    return s if staged else s + dt * s_rate
+def present_stretch(
+    staged: bool,
+    a: float,
+    s: float,
+    s_rate: float,
+    length: float,
+    length_rate: float,
+    dt: float,
+    floor: float,
+    optimal: float,
+    width_short: float,
+    width_long: float,
+    stretch_max: float,
+    shape: float,
+    limit: float,
+    max_velocity: float,
+    hill: float,
+    plateau: float,
+    slope_ratio: float,
+    viscosity: float,
+    velocity_share: float,
+) -> float:
+    """Stretch of the series element now, whose force acts; see ``muscle_rates``."""
+    if not staged:
+        return length - (s + dt * s_rate)
+    factor = active_length_factor(length, optimal, width_short, width_long)
+    stretch, _ = staged_stretch(
+        length - s, length_rate, hypothetical_force(a, factor, floor), max_velocity,
+        velocity_share, hill, plateau, slope_ratio, viscosity, stretch_max, shape, limit, dt,
+    )  # fmt: skip
+    return stretch

@@ -6,6 +6,7 @@ import mujoco
 
 from mjhill.layout import NUSER_JNT, STATES, parameter_rows, passive_row
 from mjhill.parameters import Joint, Muscle, Passive
+from mjhill.system import Coordinate, System
 
 
 def joint_spec(joint: Joint) -> mujoco.MjSpec:
@@ -13,30 +14,54 @@ def joint_spec(joint: Joint) -> mujoco.MjSpec:
 
     No gravity and nothing to see; the same motion as the joint's own model.
     """
+    return system_spec(System.of(joint))
+
+
+def system_spec(system: System) -> mujoco.MjSpec:
+    """The smallest model of a system: a body for each coordinate, no gravity, nothing to see.
+
+    A muscle that acts on several coordinates does so through a fixed tendon of its name.
+    """
     spec = mujoco.MjSpec()
-    spec.modelname = joint.name
+    spec.modelname = system.name
     spec.option.timestep = 1e-3
     spec.option.gravity = [0, 0, 0]
     spec.compiler.degree = False
+    for name, coordinate in system.coordinates.items():
+        _add_coordinate(spec, name, coordinate)
+    for name, muscle in system.muscles.items():
+        arms = system.arms[name]
+        if len(arms) == 1:
+            [(joint, gear)] = arms.items()
+            add_muscle(spec, name=name, muscle=muscle, joint=joint, gear=gear)
+            continue
+        tendon = spec.add_tendon(name=name)
+        for joint, arm in arms.items():
+            tendon.wrap_joint(joint, arm)
+        add_muscle(spec, name=name, muscle=muscle, tendon=name)
+    return spec
+
+
+def _add_coordinate(spec: mujoco.MjSpec, name: str, coordinate: Coordinate) -> None:
+    """A body of its own on a hinge or slide."""
     body = spec.worldbody.add_body(
-        name=joint.name,
-        mass=1,
+        name=name,
+        mass=coordinate.inertia if coordinate.slide else 1,
         ipos=[0, 0, 0],
-        inertia=[joint.inertia] * 3,
+        inertia=[1e-3 if coordinate.slide else coordinate.inertia] * 3,
         explicitinertial=True,
     )
+    kind = mujoco.mjtJoint.mjJNT_SLIDE if coordinate.slide else mujoco.mjtJoint.mjJNT_HINGE
     body.add_joint(
-        name=joint.name,
-        type=mujoco.mjtJoint.mjJNT_HINGE,
+        name=name,
+        type=kind,
         axis=[0, 1, 0],
-        damping=joint.damping,
-        stiffness=joint.stiffness,
-        springref=joint.rest_angle,
+        damping=coordinate.damping,
+        stiffness=coordinate.stiffness,
+        springref=coordinate.rest,
     )
-    add_passive(spec, joint=joint.name, passive=joint.passive)
-    for name, muscle in joint.muscles.items():
-        add_muscle(spec, name=name, muscle=muscle, joint=joint.name, gear=joint.gears[name])
-    return spec
+    if coordinate.passive is not None:
+        add_passive(spec, joint=name, passive=coordinate.passive)
 
 
 def add_muscle(

@@ -44,6 +44,7 @@ def _compile_equations(*modules: ModuleType) -> dict[str, Callable[..., Any]]:
     """Every function of ``modules``, jitted, each calling the jitted others."""
     namespace: dict[str, Any] = {"exp": math.exp, "log": math.log, "sqrt": math.sqrt}
     for module in modules:
+        namespace.update((k, v) for k, v in vars(module).items() if isinstance(v, (int, float)))
         for name, function in inspect.getmembers(module, inspect.isfunction):
             if function.__module__ == module.__name__:
                 bound = FunctionType(function.__code__, namespace, name)
@@ -54,7 +55,7 @@ def _compile_equations(*modules: ModuleType) -> dict[str, Callable[..., Any]]:
 _equations = _compile_equations(elements, scheme)
 muscle_rates = _equations["muscle_rates"]
 series_force = _equations["series_force"]
-present_length = _equations["present_length"]
+present_stretch = _equations["present_stretch"]
 passive_torque = _equations["passive_torque"]
 
 
@@ -172,31 +173,53 @@ def _make_act_bias() -> Any:
     m_timestep, m_integrator = offset("mjModel.opt.timestep"), offset("mjModel.opt.integrator")
     d_act, d_act_dot = offset("mjData.act"), offset("mjData.act_dot")
     d_length = offset("mjData.actuator_length")
+    d_velocity, m_biasprm = offset("mjData.actuator_velocity"), offset("mjModel.actuator_biasprm")
+    floor = _slot("activation_floor")
+    optimal, width_short, width_long = map(_slot, ("optimal_length", "width_short", "width_long"))
     stretch_max, shape, limit = map(_slot, ("series_stretch", "series_shape", "series_limit"))
+    max_velocity, hill = _slot("max_velocity"), _slot("hill_shape")
+    plateau, slope_ratio = _slot("eccentric_plateau"), _slot("eccentric_slope_ratio")
+    viscosity, share = _slot("viscosity"), _slot("velocity_activation")
     max_force = _slot("max_isometric_force")
 
     @numba.cfunc(_ACTUATOR, **_JIT)
     def act_bias(m: int, d: int, actuator: int) -> float:
         i = numba.int64(actuator)
-        tag = load_double(load_pointer(m + m_dynprm) + _ROW * i)
+        dyn = load_pointer(m + m_dynprm) + _ROW * i
         actnum = load_int(load_pointer(m + m_actnum) + 4 * i)
         dyntype = load_int(load_pointer(m + m_dyntype) + 4 * i)
-        if tag != MUSCLE_TAG or actnum != STATES or dyntype != _USER:
+        if load_double(dyn) != MUSCLE_TAG or actnum != STATES or dyntype != _USER:
             return chained_act_bias(m, d, actuator)
         gain = load_pointer(m + m_gainprm) + _ROW * i
+        bias = load_pointer(m + m_biasprm) + _ROW * i
         out = 8 * numba.int64(load_int(load_pointer(m + m_outadr) + 4 * i))
         first = 8 * numba.int64(load_int(load_pointer(m + m_actadr) + 4 * i))
-        length = load_double(load_pointer(d + d_length) + out) - load_double(
-            load_pointer(m + m_length0) + out
-        )
-        contractile = present_length(
+        act = load_pointer(d + d_act) + first
+        stretch = present_stretch(
             load_int(m + m_integrator) == _RK4,
-            load_double(load_pointer(d + d_act) + first + 16),
+            load_double(act + 8),
+            load_double(act + 16),
             load_double(load_pointer(d + d_act_dot) + first + 16),
+            load_double(load_pointer(d + d_length) + out)
+            - load_double(load_pointer(m + m_length0) + out),
+            load_double(load_pointer(d + d_velocity) + out),
             load_double(m + m_timestep),
+            load_double(dyn + floor),
+            load_double(gain + optimal),
+            load_double(gain + width_short),
+            load_double(gain + width_long),
+            load_double(gain + stretch_max),
+            load_double(gain + shape),
+            load_double(gain + limit),
+            load_double(bias + max_velocity),
+            load_double(bias + hill),
+            load_double(bias + plateau),
+            load_double(bias + slope_ratio),
+            load_double(bias + viscosity),
+            load_double(bias + share),
         )
         force, _ = series_force(
-            length - contractile,
+            stretch,
             load_double(gain + stretch_max),
             load_double(gain + shape),
             load_double(gain + limit),

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 
 from mjhill.elements import passive_torque, series_force
-from mjhill.layout import NUSER_JNT, RATE_PARAMETERS, SCALAR_JOINTS, SLOTS, has_passive, is_muscle
-from mjhill.scheme import muscle_rates, present_length
+from mjhill.layout import NUSER_JNT, RATE_PARAMETERS, SCALAR_JOINTS, SLOTS, STRETCH_PARAMETERS, has_passive, is_muscle
+from mjhill.scheme import muscle_rates, present_stretch
 
 
 def act_dyn(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float | None:
@@ -48,10 +48,16 @@ def act_bias(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float
 def series_stretch(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:
     """Stretch of the series element now [rad or m]; needs the rates of ``mj_forward``."""
     s = model.actuator_actadr[actuator] + 2
-    contractile = present_length(
-        _is_staged(model), float(data.act[s]), float(data.act_dot[s]), float(model.opt.timestep)
+    return present_stretch(
+        _is_staged(model),
+        float(data.act[s - 1]),
+        float(data.act[s]),
+        float(data.act_dot[s]),
+        muscle_length(model, data, actuator),
+        float(data.actuator_velocity[model.actuator_outadr[actuator]]),
+        float(model.opt.timestep),
+        *(_parameter(model, actuator, name) for name in STRETCH_PARAMETERS),
     )
-    return muscle_length(model, data, actuator) - contractile
 
 
 def muscle_length(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:
