@@ -108,14 +108,21 @@ class Muscle:
         "V_max", _VELOCITY, "shortening velocity without load (eq. 3)", (0, 1e4)
     )
     hill_shape: float = _quantity(
-        "A", "-", "Hill's a/F0, curvature of force-velocity (eq. 3)", (0, 10)
+        # below 0.05 a muscle holds or slips like a clutch, which no timestep resolves
+        "A",
+        "-",
+        "Hill's a/F0, curvature of force-velocity (eq. 3)",
+        (0.05, 10),
+        low_allowed=True,
     )
     series_stretch: float = _quantity(
         "x_max", _LENGTH, "stretch of the series element at F_max (eq. 7)", (0, 100)
     )
     series_shape: float = _quantity(
-        "S", "-", "shape of the exponential series element (eq. 7)", (0, 20), default=3.0
-    )
+        # above 10 stiffness rises by four powers of ten within the working range
+        "S", "-", "shape of the exponential series element (eq. 7)",
+        (0.01, 10), default=3.0, low_allowed=True,
+    )  # fmt: skip
     excitation_tau: float = _quantity("τ_nex", "s", "neural excitation, time constant (12)", (0, 1))
     activation_tau: float = _quantity("τ_act", "s", "activation, time constant (12)", (0, 1))
     deactivation_tau: float = _quantity("τ_deact", "s", "deactivation, time constant (12)", (0, 1))

@@ -82,8 +82,9 @@ def simulate(
     loads = _loads(whole, torque)
     movements = _known_movements(whole, movement or {})
     times: _Vector = np.arange(round(duration / sample) + 1, dtype=np.float64) * sample
-    jumps = [*inputs.values(), *loads.values(), *movements.values()]
-    knots = _knots((item.breaks for item in jumps), float(times[-1]))
+    breaks = [signal.breaks for signal in (*inputs.values(), *loads.values())]
+    breaks += [moved.breaks for moved in movements.values()]
+    knots = _knots(breaks, float(times[-1]))
     state = rest_state(system) if start is None else np.array(start, dtype=np.float64)
     states = np.empty((len(times), len(state)))
     states[0] = state
@@ -314,7 +315,8 @@ def _recorded(
     first = 2 * len(system.coordinates)
     for index, (name, muscle) in enumerate(system.muscles.items()):
         n, a, s = states[:, first + 3 * index : first + 3 * index + 3].T
-        length = sum(arm * states[:, order[joint]] for joint, arm in system.arms[name].items())
+        arms = system.arms[name].items()
+        length = np.sum([arm * states[:, order[joint]] for joint, arm in arms], axis=0)
         rows = list(zip(a.tolist(), length.tolist(), (length - s).tolist(), strict=True))
         unit, effort = ("m", "N") if system.slides(name) else ("rad", "N·m")
         columns = {

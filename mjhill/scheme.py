@@ -23,9 +23,8 @@ from mjhill.elements import (
     velocity_scale,
 )
 
-
-NEGLIGIBLE = 3e-3
-TOLERANCE = 1e-3  # of one substep of the stretch, in units of F_max
+NEGLIGIBLE = 3e-3  # bend of the equation within a step that needs no correction [F_max]
+TOLERANCE = 1e-3  # correction of a substep that is taken [F_max]
 PATIENCE = 30  # substeps tried, after which any is taken
 
 
@@ -74,9 +73,9 @@ def stretch_rate(
     """Rate [length/s] of the stretch of the series element at a constant rate of length.
 
     Returns:
-        the rate; two numbers p and q such that its derivative by the stretch is -p/q [1/s]; q times its
-        derivative by the hypothetical force; the stiffness of the series element [F_max per
-        unit of stretch] and its force [F_max].
+        the rate; two numbers p and q such that its derivative by the stretch is -p/q [1/s]; q
+        times its derivative by the hypothetical force; the stiffness of the series element
+        [F_max per unit of stretch] and its force [F_max].
     """
     force, stiffness = series_force(stretch, stretch_max, shape, limit)
     velocity, p, q, r = contractile_velocity(
@@ -319,10 +318,11 @@ def muscle_rates(
     ``staged`` is for RK4, whose stages each see a state of their own: s belongs to the length.
 
     Under single-step integrators s is one step old, and its rate brings it up to the present
-    length along the way that length has really come; ``present_length`` gives it to the force.
+    length along the way that length has really gone; ``present_stretch`` gives it to the force.
     (MuJoCo's ``actearly`` does the same with an activation.) Going on from the present along
     the present velocity instead would miss what the joint accelerates by in a step, which acts
-    as added inertia and is most of the error at long steps.
+    as added inertia and is most of the error at long steps. Activation at the start of that
+    step is found by going back from the present one.
 
     Electrical stimulation puts the input straight into activation (sect. 4.1.2).
     """

@@ -10,7 +10,7 @@ from importlib.metadata import version
 
 from mjhill.bench.result import Result
 
-NAMES = ("accuracy", "cost", "threads", "start", "video")
+NAMES = ("accuracy", "cost", "threads", "start", "video")  # and sweep, which takes longer
 
 
 def run(

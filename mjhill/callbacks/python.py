@@ -6,7 +6,15 @@ import mujoco
 import numpy as np
 
 from mjhill.elements import passive_torque, series_force
-from mjhill.layout import NUSER_JNT, RATE_PARAMETERS, SCALAR_JOINTS, SLOTS, STRETCH_PARAMETERS, has_passive, is_muscle
+from mjhill.layout import (
+    NUSER_JNT,
+    RATE_PARAMETERS,
+    SCALAR_JOINTS,
+    SLOTS,
+    STRETCH_PARAMETERS,
+    has_passive,
+    is_muscle,
+)
 from mjhill.scheme import muscle_rates, present_stretch
 
 

@@ -181,13 +181,32 @@ def compare(model: str, output: Path, video: bool, cost: bool, as_json: bool) ->
 
 @main.command()
 @click.argument("names", nargs=-1)
+@click.option("--count", type=click.IntRange(1), help="sweep: systems of each kind.")
+@click.option("--kind", multiple=True, help="sweep: kind of system; may be given again.")
+@click.option("--case", metavar="KIND:NUMBER", help="sweep: one system again.")
 @json_option
-def bench(names: tuple[str, ...], as_json: bool) -> None:
-    """Measure accuracy, cost, threads, start and video, or those of NAMES."""
+def bench(
+    names: tuple[str, ...],
+    count: int | None,
+    kind: tuple[str, ...],
+    case: str | None,
+    as_json: bool,
+) -> None:
+    """Measure accuracy, cost, threads, start and video, or those of NAMES.
+
+    With the name sweep: random systems against the reference solver, about 5 minutes.
+    """
     from mjhill import bench as benchmarks
 
+    if (count or kind or case) and names != ("sweep",):
+        raise click.UsageError("--count, --kind and --case go with: mjhill bench sweep")
     with progress_bar("measuring") as progress:
-        results = benchmarks.run(names, progress)
+        if names == ("sweep",):
+            from mjhill.bench import sweep
+
+            results = {"sweep": sweep.measure(kind, count, case, progress)}
+        else:
+            results = benchmarks.run(names, progress)
     if as_json:
         click.echo(json.dumps({name: result.rows for name, result in results.items()}))
         return

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 from zlib import crc32
 
 import mujoco
@@ -88,9 +89,9 @@ def _wide(kind: str, number: int, random: _Random) -> Case:
             width_short=width * _log(random, 0.3, 3),
             width_long=width * _log(random, 0.3, 3),
             max_velocity=_log(random, 0.5, 500),
-            hill_shape=_log(random, 0.01, 10),
+            hill_shape=_log(random, 0.05, 10),
             series_stretch=_log(random, 0.01, 3),
-            series_shape=_log(random, 0.01, 20),
+            series_shape=_log(random, 0.01, 10),
             excitation_tau=_log(random, 1e-3, 1),
             activation_tau=_log(random, 1e-3, 1),
             deactivation_tau=_log(random, 1e-3, 1),
@@ -171,9 +172,7 @@ def _several(kind: str, number: int, random: _Random) -> Case:
         pulls = float(random.choice([-1.0, 1.0]))
         part = _varied_muscle(random, list(joint.muscles.values())[0 if pulls < 0 else 1])
         share = _log(random, 0.2, 0.8)
-        muscles[f"x{extra}"] = replace(
-            part, max_isometric_force=share * part.max_isometric_force
-        )
+        muscles[f"x{extra}"] = replace(part, max_isometric_force=share * part.max_isometric_force)
         arms[f"x{extra}"] = {name: pulls * _log(random, 0.6, 1.2) for name in coordinates}
     system = System(name="several", coordinates=coordinates, muscles=muscles, arms=arms)
     return _driven(kind, number, random, system, joints[0].range)
@@ -187,9 +186,9 @@ def _stretch(kind: str, number: int, random: _Random) -> Case:
     frequency = _log(random, 3, 12)
     phase = float(random.choice([0.0, math.pi]))
     rate = 2 * math.pi * frequency
-    # starts still: the velocity grows from 0 as a sine, the position as 1 - cos
+    start = muscle.optimal_length
     movement = Movement(
-        lambda t: muscle.optimal_length + peak / rate * (math.cos(phase) - math.cos(rate * t + phase)),
+        lambda t: start + peak / rate * (math.cos(phase) - math.cos(rate * t + phase)),
         lambda t: peak * math.sin(rate * t + phase),
     )
     coordinate = Coordinate(inertia=joint.inertia)
@@ -246,10 +245,7 @@ def _driven(
         system,
         {name: _excitation(random, tonic[name]) for name in system.muscles},
         {next(iter(system.coordinates)): _push(random, largest)},
-        {
-            name: float(low + (high - low) * random.uniform(0.2, 0.8))
-            for name in system.coordinates
-        },
+        {name: float(low + (high - low) * random.uniform(0.2, 0.8)) for name in system.coordinates},
         tonic,
     )
 
@@ -262,7 +258,8 @@ def _excitation(random: _Random, tonic: float) -> Signal:
     """An input that leaves its tonic level: a step, pulses, or a sinusoid."""
     onset = _on_grid(random, 0.0, 0.2)
     level = float(random.choice([0.0, 1.0, random.uniform(0, 1)]))
-    form = random.choice(["hold", "step", "pulse", "pulses", "sinusoid"], p=[0.1, 0.3, 0.25, 0.2, 0.15])
+    forms = {"hold": 0.1, "step": 0.3, "pulse": 0.25, "pulses": 0.2, "sinusoid": 0.15}
+    form = random.choice(list(forms), p=list(forms.values()))
     if form == "hold":
         return as_signal(tonic)
     if form == "step":
@@ -281,7 +278,8 @@ def _excitation(random: _Random, tonic: float) -> Signal:
 
 def _push(random: _Random, force: float) -> Signal:
     """An external torque: none, a step, an impulse, or a sinusoid."""
-    form = random.choice(["none", "step", "impulse", "sinusoid"], p=[0.4, 0.2, 0.25, 0.15])
+    forms = {"none": 0.4, "step": 0.2, "impulse": 0.25, "sinusoid": 0.15}
+    form = random.choice(list(forms), p=list(forms.values()))
     size = force * float(random.choice([-1, 1]))
     onset = _on_grid(random, 0.0, 0.3)
     if form == "step":
@@ -309,7 +307,7 @@ def _varied_muscle(random: _Random, muscle: Muscle) -> Muscle:
     return replace(
         muscle,
         max_isometric_force=muscle.max_isometric_force * _log(random, 0.5, 2),
-        optimal_length=muscle.optimal_length + muscle.width_short * float(random.uniform(-0.3, 0.3)),
+        optimal_length=muscle.optimal_length + 0.3 * muscle.width_short * _either(random),
         width_short=muscle.width_short * _log(random, 0.7, 1.5),
         width_long=muscle.width_long * _log(random, 0.7, 1.5),
         max_velocity=muscle.max_velocity * _log(random, 0.5, 2),
@@ -331,7 +329,7 @@ def _linear_muscle(random: _Random, optimal: float, force: float) -> Muscle:
     )
 
 
-def _shape(random: _Random) -> dict[str, float | bool]:
+def _shape(random: _Random) -> dict[str, Any]:
     """Time constants and shapes, which have no unit of length or force."""
     return {
         "hill_shape": float(random.uniform(0.1, 0.5)),
@@ -346,6 +344,10 @@ def _shape(random: _Random) -> dict[str, float | bool]:
         "activation_floor": _log(random, 1e-3, 1e-2),
         "electrical_stimulation": bool(random.random() < 0.15),
     }
+
+
+def _either(random: _Random) -> float:
+    return float(random.uniform(-1, 1))
 
 
 def _log(random: _Random, low: float, high: float) -> float:

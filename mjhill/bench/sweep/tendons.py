@@ -79,4 +79,9 @@ def tendon_model(
         tendon.wrap_site(f"insertion{last}{side}")
         part = muscle(random, float(random.uniform(0.05, 0.15)) * scale, force)
         add_muscle(spec, name=label, muscle=part, tendon=label)
+        spec.add_sensor(
+            type=mujoco.mjtSensor.mjSENS_ACTUATORFRC,
+            objtype=mujoco.mjtObj.mjOBJ_ACTUATOR,
+            objname=label,
+        )
     return spec.compile(), torque

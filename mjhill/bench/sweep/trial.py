@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Any
 
 import mujoco
 import mujoco.rollout
@@ -34,13 +35,13 @@ class Truth:
     Attributes:
         case: The case.
         positions: Positions at multiples of ``SAMPLE``, shape (T, nq).
-        forces: Tension of each muscle there, shape (T, nmuscle); None for spatial tendons.
+        forces: Tension of each muscle there, shape (T, nmuscle).
         amplification: Largest change of position, in units of ``PUSH``, that a push makes.
     """
 
     case: Case
     positions: _Values
-    forces: _Values | None
+    forces: _Values
     amplification: float
 
     @property
@@ -55,9 +56,9 @@ def solve(case: Case) -> Truth:
         recording = _reference(case)
         return Truth(case, _positions(case, recording), _forces(case, recording), 0.0)
     if case.system is None:
-        positions, forces = run(case, "RK4", FINE), None
-        base = run(case, "RK4", _PUSHED_FINE)
-        runs = [run(other, "RK4", _PUSHED_FINE) for other in _pushed(case, positions)]
+        positions, forces = _fine(case, FINE)
+        base, _ = _fine(case, _PUSHED_FINE)
+        runs = [_fine(other, _PUSHED_FINE)[0] for other in _pushed(case, positions)]
     else:
         recording = _reference(case)
         positions, forces = _positions(case, recording), _forces(case, recording)
@@ -68,10 +69,10 @@ def solve(case: Case) -> Truth:
 
 
 def _pushed(case: Case, positions: _Values) -> list[Case]:
-    """The case from a start moved by a share of the range, and under a torque of a share of F_max."""
+    """The case from a start moved by a share of the range, and with a push added."""
     [first, *_] = case.start
     moved = {**case.start, first: case.start[first] + PUSH * float(np.ptp(positions, axis=0).max())}
-    largest = max(read_muscle(case.model, name).max_isometric_force for name in case.tonic)
+    largest = _largest_force(case)
     if case.system is None:  # force of a tendon to torque of a hinge
         data = mujoco.MjData(case.model)
         mujoco.mj_fwdPosition(case.model, data)
@@ -80,12 +81,12 @@ def _pushed(case: Case, positions: _Values) -> list[Case]:
     return [replace(case, start=moved), replace(case, torque={**case.torque, first: torque})]
 
 
-def _reference(case: Case, **options: float) -> Recording:
+def _reference(case: Case) -> Recording:
     assert case.system is not None
     start = rest_state(case.system, case.start, case.tonic)
     return simulate(
         case.system, case.excitation, torque=case.torque, movement=case.movement,
-        duration=DURATION, start=start, sample=SAMPLE, solver="LSODA", **options,
+        duration=DURATION, start=start, sample=SAMPLE, solver="LSODA",
     )  # fmt: skip
 
 
@@ -102,6 +103,17 @@ def _forces(case: Case, recording: Recording) -> _Values:
     return np.array([recording[f"{name}.force"] for name in case.tonic]).T
 
 
+def _fine(case: Case, timestep: float) -> tuple[_Values, _Values]:
+    """Positions and tensions of a case under RK4 at multiples of ``SAMPLE``.
+
+    Its sensors are the forces of its muscles. The last tension is that of the step before.
+    """
+    use(case.model, "RK4", timestep)
+    every = round(SAMPLE / timestep)
+    positions, sensed = _rollout(case.model, at_start(case), _inputs(case, timestep))
+    return positions[::every], -np.vstack([sensed, sensed[-1]])[::every]
+
+
 def use(model: mujoco.MjModel, integrator: str, timestep: float) -> None:
     """Set integrator, by its name in MJCF, and timestep [s]."""
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
@@ -114,37 +126,50 @@ def run(case: Case, integrator: str, timestep: float) -> _Values:
     Shape (T, nq). Callbacks must be installed. From where MuJoCo warns, positions are NaN.
     """
     use(case.model, integrator, timestep)
-    data = at_start(case)
-    return _rollout(case.model, data, _inputs(case, timestep), round(SAMPLE / timestep) or 1)
+    positions, _ = _rollout(case.model, at_start(case), _inputs(case, timestep))
+    return positions[:: round(SAMPLE / timestep) or 1]
+
+
+def error(truth: Truth, found: _Values) -> float:
+    """Largest error of positions [% of the range], or of tension [% of F_max] where prescribed."""
+    if truth.case.movement:
+        exact, unit = truth.forces, _largest_force(truth.case)
+    else:
+        exact, unit = truth.positions, truth.range
+    exact = exact[:: (len(exact) - 1) // (len(found) - 1)]
+    worst = float(np.abs(found - exact)[1:].max())
+    return 100 * worst / unit if np.isfinite(worst) else float("inf")
+
+
+def _largest_force(case: Case) -> float:
+    return max(read_muscle(case.model, name).max_isometric_force for name in case.tonic)
 
 
 def floor(truth: Truth, integrator: str, timestep: float) -> _Values:
-    """As ``run``, of the same plant driven by the true muscle torques."""
+    """As ``run``, with motors for muscles that give the true tensions."""
     case = truth.case
-    assert truth.forces is not None
-    use(case.model, integrator, timestep)
+    model = copy(case.model)
+    use(model, integrator, timestep)
     data = at_start(case)
-    arms = np.zeros((len(case.tonic), case.model.nv))
-    for row, name in enumerate(case.tonic):
-        at = address(case.model, name)
-        mujoco.mju_sparse2dense(
-            arms[row : row + 1], data.actuator_moment,
-            data.moment_rownnz[at.out : at.out + 1], data.moment_rowadr[at.out : at.out + 1],
-            data.moment_colind,
-        )  # fmt: skip
     inputs = _inputs(case, timestep)
     every = round(timestep / SAMPLE)
-    inputs[:, case.model.nu :] -= truth.forces[::every][: len(inputs)] @ arms
-    before = case.model.opt.disableflags
-    case.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
-    try:
-        return _rollout(case.model, data, inputs, 1)
-    finally:
-        case.model.opt.disableflags = before
+    for column, name in enumerate(case.tonic):
+        at = address(model, name)
+        model.actuator_dyntype[at.actuator] = mujoco.mjtDyn.mjDYN_NONE
+        model.actuator_actadr[at.actuator], model.actuator_actnum[at.actuator] = -1, 0
+        model.actuator_biastype[at.actuator] = mujoco.mjtBias.mjBIAS_NONE
+        model.actuator_gainprm[at.actuator, 0] = -1.0
+        model.actuator_ctrllimited[at.ctrl] = 0
+        inputs[:, at.ctrl] = truth.forces[::every, column][: len(inputs)]
+    positions, _ = _rollout(model, data, inputs)
+    return positions
 
 
-def stretched(case: Case, timestep: float, integrator: str = "implicitfast") -> _Values:
-    """Tension of the muscles of a case whose joint is moved, at every step, shape (T, nmuscle)."""
+def stretched(case: Case, integrator: str, timestep: float) -> _Values:
+    """Tension of the muscles of a case whose joint is moved, at every step, shape (T, nmuscle).
+
+    Velocity is what it is in MuJoCo's own movements: the mean one of the step before.
+    """
     use(case.model, integrator, timestep)
     data = at_start(case)
     inputs = _inputs(case, timestep)
@@ -153,9 +178,10 @@ def stretched(case: Case, timestep: float, integrator: str = "implicitfast") -> 
     forces = np.empty((steps + 1, len(outs)))
     for step in range(steps + 1):
         for name, movement in case.movement.items():
-            joint = case.model.joint(name)
-            data.qpos[joint.qposadr[0]] = movement.position(step * timestep)
-            data.qvel[joint.dofadr[0]] = (movement.position(step*timestep)-movement.position((step-1)*timestep))/timestep
+            joint = joint_id(case.model, name)
+            now, before = (movement.position(k * timestep) for k in (step, step - 1))
+            data.qpos[case.model.jnt_qposadr[joint]] = now
+            data.qvel[case.model.jnt_dofadr[joint]] = (now - before) / timestep if step else 0.0
         data.ctrl[:] = inputs[min(step, steps - 1), : case.model.nu]
         mujoco.mj_step(case.model, data)
         forces[step] = -data.actuator_force[outs]
@@ -185,18 +211,21 @@ def _inputs(case: Case, timestep: float) -> _Values:
     return inputs
 
 
-def _sampled(signal: Signal, times: _Values) -> list[float]:
+def _sampled(signal: Signal, times: NDArray[Any]) -> list[float]:
     return [signal(time) for time in times.tolist()]
 
 
-def _rollout(model: mujoco.MjModel, data: mujoco.MjData, inputs: _Values, every: int) -> _Values:
+def _rollout(
+    model: mujoco.MjModel, data: mujoco.MjData, inputs: _Values
+) -> tuple[_Values, _Values]:
+    """Positions at the start and after each step, and what sensors read in each step."""
     start = np.empty(mujoco.mj_stateSize(model, _FULL))
     mujoco.mj_getState(model, data, start, _FULL)
-    states, _ = mujoco.rollout.rollout(
+    states, sensed = mujoco.rollout.rollout(
         model, data, start[None], inputs[None], control_spec=int(_INPUTS)
     )
     positions = np.vstack([start, states[0]])[:, 1 : 1 + model.nq]
     if data.warning.number.any():  # the rest repeats the last good state, or a reset one
         after = max(round(data.time / model.opt.timestep), 1)
         positions[after:] = np.nan
-    return np.ascontiguousarray(positions[::every])
+    return positions, np.asarray(sensed[0])
