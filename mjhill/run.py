@@ -7,6 +7,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from mjhill.callbacks.python import control, muscle_length, series_stretch
 from mjhill.checks import check_model
@@ -16,17 +17,19 @@ from mjhill.layout import (
     SCALAR_JOINTS,
     actuator_names,
     address,
+    addresses,
     is_muscle,
     joint_id,
     joint_names,
     read_muscle,
     turns,
 )
-from mjhill.readings import shortening_velocity, tension
+from mjhill.readings import tension
 from mjhill.recording import Recording
 from mjhill.signals import Signal, as_signals
 
 _Reader = Callable[[mujoco.MjData], float]
+_Values = NDArray[np.float64]
 _COORDINATES = {  # joint type: position and velocity coordinates and their units
     int(mujoco.mjtJoint.mjJNT_HINGE): (("angle", "rad"), ("velocity", "rad/s")),
     int(mujoco.mjtJoint.mjJNT_SLIDE): (("position", "m"), ("velocity", "m/s")),
@@ -52,6 +55,11 @@ def record(
     ``velocity`` (of the contractile element, shortening positive), ``stretch`` (of the series
     element) and ``force`` (tension positive). A native MuJoCo muscle has ``u``, ``a``, ``force``,
     any other actuator ``u`` and ``force`` as MuJoCo has them.
+
+    A muscle's ``velocity`` is the mean over the interval from the sample before: how much the
+    contractile element has shortened since, by the time between. So it adds up to the way the
+    element has really come. That of the first sample is the scheme's: the mean over the step
+    before it, or under RK4 the rate at that moment.
 
     Args:
         model: The model.
@@ -89,15 +97,28 @@ def record(
         if step % every == 0:
             mujoco.mj_forward(model, data)  # lengths and rates of this very state
             table[step // every] = [data.time, *(read(data) for _, _, read in readers)]
+        if step == 0:
+            first = _first_velocities(model, data)
         if step < steps:
             mujoco.mj_step(model, data)
             check_warnings(data)
         if progress is not None and step % 256 == 0:
             progress(step / steps)
-    columns = np.ascontiguousarray(table.T)
-    names = [name for name, _, _ in readers]
-    units = {name: unit for name, unit, _ in readers}
-    return Recording(columns[0], dict(zip(names, columns[1:], strict=True)), units, _about(model))
+    time, *columns = np.ascontiguousarray(table.T)
+    series = dict(zip([name for name, _, _ in readers], columns, strict=True))
+    for name, velocity in first.items():
+        series[name] = _mean_rate(time, series[name], velocity)
+    return Recording(time, series, {name: unit for name, unit, _ in readers}, _about(model))
+
+
+def _first_velocities(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, float]:
+    """Velocity of each muscle's contractile element as the scheme has it now, by series."""
+    return {f"{name}.velocity": -float(data.act_dot[at.act + 2]) for name, at in addresses(model)}
+
+
+def _mean_rate(time: _Values, values: _Values, first: float) -> _Values:
+    """Mean rate of values since the sample before; ``first`` for the first sample."""
+    return np.concatenate(([first], np.diff(values) / np.diff(time)))
 
 
 def _require_callbacks(model: mujoco.MjModel) -> None:
@@ -135,7 +156,10 @@ def _scalar_joints(model: mujoco.MjModel) -> list[str]:
 
 
 def _readers(model: mujoco.MjModel, loads: list[str]) -> list[tuple[str, str, _Reader]]:
-    """Name, unit and reader of each series."""
+    """Name, unit and reader of each series.
+
+    What is read for the velocity of a muscle is the way its contractile element has shortened.
+    """
     readers: list[tuple[str, str, _Reader]] = []
     for joint in range(model.njnt):
         readers += _joint_readers(model, joint)
@@ -185,15 +209,14 @@ def _muscle_readers(model: mujoco.MjModel, actuator: int) -> list[tuple[str, str
     def stretch(data: mujoco.MjData) -> float:
         return series_stretch(model, data, actuator)
 
-    def velocity(data: mujoco.MjData) -> float:
-        length = muscle_length(model, data, actuator)
-        return shortening_velocity(muscle, float(data.act[at.act + 1]), length, stretch(data))
+    def shortened(data: mujoco.MjData) -> float:
+        return stretch(data) - muscle_length(model, data, actuator)
 
     return [
         (f"{name}.u", "-", lambda data: control(model, data, actuator)),
         (f"{name}.n", "-", _item("act", at.act)),
         (f"{name}.a", "-", _item("act", at.act + 1)),
-        (f"{name}.velocity", f"{length_unit}/s", velocity),
+        (f"{name}.velocity", f"{length_unit}/s", shortened),
         (f"{name}.stretch", length_unit, stretch),
         (f"{name}.force", effort, lambda data: tension(muscle, stretch(data))),
     ]

@@ -1,7 +1,11 @@
+import dataclasses
+import math
+
 import mujoco
 import pytest
 
 import mjhill
+from mjhill.checks import natural_frequencies
 from mjhill.spec import joint_spec
 
 
@@ -69,7 +73,9 @@ def test_a_timestep_that_is_not_positive_is_refused(pair, timestep):
 
 def test_a_timestep_past_the_stability_of_the_series_element_warns(pair):
     pair.opt.timestep = 0.05
-    with pytest.warns(RuntimeWarning, match="timestep 0.05 s is past .* becomes unstable"):
+    with pytest.warns(
+        RuntimeWarning, match="joint 'elbow' with its muscles at full .* meaningless"
+    ):
         mjhill.check_model(pair)
 
 
@@ -77,3 +83,39 @@ def test_user_actuators_of_others_are_not_looked_at(pair):
     pair.actuator_dynprm[:, 0] = 7.0
     pair.actuator_dynprm[:, 1] = -1.0
     mjhill.check_model(pair)
+
+
+def test_a_coarse_timestep_is_a_finding_with_the_timestep_that_would_do(pair):
+    assert mjhill.check_model(pair) == ()
+    pair.opt.timestep = 5e-3
+    [finding] = mjhill.check_model(pair)
+    assert not finding.severe
+    assert "joint 'elbow' with its muscles at full force" in str(finding)
+    assert "may be off by 5 %" in str(finding)
+    pair.opt.timestep = 0.999 * finding.timestep
+    assert mjhill.check_model(pair) == ()
+
+
+def test_rk4_warns_of_a_time_constant_that_it_cannot_follow(elbow, muscle):
+    quick = dataclasses.replace(muscle, excitation_tau=1.5e-3)
+    model = joint_spec(
+        dataclasses.replace(elbow, muscles={**elbow.muscles, "elbow_flexor": quick})
+    ).compile()
+    model.opt.timestep = 5e-3
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    [finding] = mjhill.check_model(model)
+    assert str(finding).startswith("muscle 'elbow_flexor': timestep over excitation_tau is 3.33")
+    assert finding.timestep == pytest.approx(3e-3)
+
+
+def test_the_natural_frequency_is_that_of_the_series_elements_on_the_inertia(pair):
+    muscles = {name: mjhill.read_muscle(pair, name) for name in mjhill.muscle_names(pair)}
+    for joint in range(pair.njnt):
+        pair.jnt_user[joint] = 0.0  # no exponential elasticity
+    [(joint, frequency)] = natural_frequencies(pair, muscles)
+    stiffness = sum(
+        m.max_isometric_force * m.series_shape / m.series_stretch / (1 - math.exp(-m.series_shape))
+        for m in muscles.values()
+    )
+    assert joint == "elbow"
+    assert frequency == pytest.approx(math.sqrt(stiffness / pair.body_inertia[1, 1]))

@@ -57,10 +57,16 @@ def test_slope_of_the_velocity_is_its_derivative(force, hypothetical):
     if force - 1e-7 < hypothetical < force + 1e-7:
         pytest.skip("the slope is that of one side at the corner")
     low, high = (elements.contractile_velocity(force + d, *parameters)[0] for d in (-1e-7, 1e-7))
-    _, p, q = elements.contractile_velocity(force, *parameters)
+    _, p, q, r = elements.contractile_velocity(force, *parameters)
     assert p > 0
     assert q > 0
     assert -p / q == pytest.approx((high - low) / 2e-7, rel=1e-4)
+    step = 1e-7 * hypothetical
+    low, high = (
+        elements.contractile_velocity(force, hypothetical + d, *parameters[1:])[0]
+        for d in (-step, step)
+    )
+    assert r / q == pytest.approx((high - low) / (2 * step), rel=1e-4)
 
 
 def test_velocity_falls_with_force_without_a_jump():

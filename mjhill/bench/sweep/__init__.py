@@ -210,8 +210,8 @@ def table(outcomes: Sequence[Outcome]) -> Result:
 
 
 def is_missed(outcome: Outcome) -> bool:
-    """Whether an outcome is more than 5 % off with no finding that foretold it."""
-    steady = outcome.amplification <= SENSITIVE
+    """Whether a free movement is more than 5 % off with no finding that foretold it."""
+    steady = outcome.amplification <= SENSITIVE and outcome.floor is not None
     return steady and outcome.error > MISSED and not outcome.finding
 
 

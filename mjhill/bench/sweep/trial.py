@@ -19,9 +19,10 @@ from mjhill.reference import rest_state, simulate
 from mjhill.signals import Signal, as_signal
 
 SAMPLE = 0.5e-3  # [s], divides every timestep of the sweep
-FINE = 10e-6  # [s], RK4's timestep where the reference solver cannot follow
+FINE = 50e-6  # [s], RK4's timestep where the reference solver cannot follow
 PUSH = 1e-3  # share of the range of angle and of F_max by which a sensitive system is found
-_PUSHED_FINE = 50e-6  # [s], coarser: two pushed runs are compared with one another
+_PUSHED_FINE = 200e-6  # [s], coarser: two pushed runs are compared with one another
+_RTOL, _ATOL = 1e-7, 1e-9  # of the reference, a thousandth of the errors looked for
 
 _Values = NDArray[np.float64]
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -86,7 +87,7 @@ def _reference(case: Case) -> Recording:
     start = rest_state(case.system, case.start, case.tonic)
     return simulate(
         case.system, case.excitation, torque=case.torque, movement=case.movement,
-        duration=DURATION, start=start, sample=SAMPLE, solver="LSODA",
+        duration=DURATION, start=start, sample=SAMPLE, solver="LSODA", rtol=_RTOL, atol=_ATOL,
     )  # fmt: skip
 
 
