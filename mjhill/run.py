@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import mujoco
@@ -77,12 +77,7 @@ def record(
             warned: it resets a state that went bad and goes on, so what follows is no run.
     """
     check_model(model)
-    if not (np.isfinite(duration) and duration > 0):
-        raise ValueError(f"duration must be positive, got {duration} s")
-    timestep = float(model.opt.timestep)
-    steps = round(duration / timestep)
-    if steps < 1:
-        raise ValueError(f"duration must be at least a timestep, {timestep:g} s, got {duration} s")
+    steps = _number_of_steps(duration, float(model.opt.timestep))
     if every < 1:
         raise ValueError(f"every must be at least 1 step, got {every}")
     _require_callbacks(model)
@@ -92,23 +87,35 @@ def record(
     apply = _inputs(model, inputs, loads)
     readers = _readers(model, list(loads))
     table = np.empty((steps // every + 1, len(readers) + 1))
-    for step in range(steps + 1):
-        apply(data, data.time + 0.5 * timestep)
+    for step in _stepped(model, data, steps, apply, progress):
         if step % every == 0:
             mujoco.mj_forward(model, data)  # lengths and rates of this very state
             table[step // every] = [data.time, *(read(data) for _, _, read in readers)]
         if step == 0:
             first = _first_velocities(model, data)
-        if step < steps:
-            mujoco.mj_step(model, data)
-            check_warnings(data)
-        if progress is not None and step % 256 == 0:
-            progress(step / steps)
     time, *columns = np.ascontiguousarray(table.T)
     series = dict(zip([name for name, _, _ in readers], columns, strict=True))
     for name, velocity in first.items():
         series[name] = _mean_rate(time, series[name], velocity)
     return Recording(time, series, {name: unit for name, unit, _ in readers}, _about(model))
+
+
+def _stepped(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    steps: int,
+    apply: Callable[[mujoco.MjData, float], None],
+    progress: Callable[[float], None] | None,
+) -> Iterator[int]:
+    """The number of steps done, from 0 on, with the inputs of the next step in place."""
+    for step in range(steps + 1):
+        apply(data, data.time + 0.5 * model.opt.timestep)
+        yield step
+        if step < steps:
+            mujoco.mj_step(model, data)
+            check_warnings(data)
+        if progress is not None and step % 256 == 0:
+            progress(step / steps)
 
 
 def _first_velocities(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, float]:
@@ -119,6 +126,15 @@ def _first_velocities(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, f
 def _mean_rate(time: _Values, values: _Values, first: float) -> _Values:
     """Mean rate of values since the sample before; ``first`` for the first sample."""
     return np.concatenate(([first], np.diff(values) / np.diff(time)))
+
+
+def _number_of_steps(duration: float, timestep: float) -> int:
+    if not (np.isfinite(duration) and duration > 0):
+        raise ValueError(f"duration must be positive, got {duration} s")
+    steps = round(duration / timestep)
+    if steps < 1:
+        raise ValueError(f"duration must be at least a timestep, {timestep:g} s, got {duration} s")
+    return steps
 
 
 def _require_callbacks(model: mujoco.MjModel) -> None:
