@@ -111,11 +111,28 @@ def test_the_page_of_joints_has_the_numbers_of_the_parameter_file():
             assert float(cell) == pytest.approx(row["ours"], rel=6e-3)
 
 
+def table_of(page, name):
+    (table,) = re.findall(rf"<!-- {name}.*?-->\n(.*?)<!-- end -->", page, re.DOTALL)
+    return [
+        [cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()[2:]
+    ]
+
+
 def test_the_accuracy_table_is_what_the_benchmark_measures():
-    (table,) = re.findall(r"<!-- accuracy.*?-->\n(.*?)<!-- end -->", README, re.DOTALL)
-    written = [line.strip("| ").split(" | ") for line in table.splitlines()[2:]]
-    measured = accuracy.brief()
+    written, measured = table_of(README, "accuracy"), accuracy.brief()
     assert [row[0] for row in written] == [row[0] for row in measured]
-    for row, (_, *errors) in zip(written, measured, strict=True):
-        # written with two digits; the smallest, RK4's, depend on the last bits of the reference
-        assert [float(cell) for cell in row[1:]] == pytest.approx(errors, rel=0.1, abs=2e-5)
+    for row, (_, cells) in zip(written, measured, strict=True):
+        for cell, errors in zip(row[1:], cells, strict=True):
+            found = [float(number) for number in cell.split("/")] if cell else None
+            # written with two digits; RK4's smallest depend on the last bits of the reference
+            assert (found is None and errors is None) or found == pytest.approx(
+                errors, rel=0.1, abs=2e-5
+            )
+
+
+def test_the_page_on_numerics_has_what_the_benchmark_measures():
+    page = (ROOT / "docs" / "numerics.md").read_text(encoding="utf-8")
+    for name, integrator, *cells in table_of(page, "movements"):
+        for cell, timestep in zip(cells, accuracy.TIMESTEPS, strict=True):
+            found = accuracy.error(name, "mjhill", integrator.upper(), timestep)
+            assert float(cell) == pytest.approx(found, rel=0.1, abs=2e-5)

@@ -4,6 +4,7 @@ import pytest
 from conftest import rest
 
 import mjhill
+from mjhill.readings import shortening_velocity
 from mjhill.spec import joint_spec
 
 
@@ -31,16 +32,47 @@ def test_recorded_force_is_the_force_that_mujoco_applies(pair):
     assert result["elbow_flexor.force"][-1] > 1.0
 
 
-def test_recorded_velocity_is_the_rate_of_the_contractile_element(pair):
+@pytest.mark.parametrize("every", [1, 4])
+@pytest.mark.parametrize("integrator", ["EULER", "IMPLICITFAST", "IMPLICIT", "RK4"])
+def test_recorded_velocity_is_how_far_the_contractile_element_shortened(pair, integrator, every):
+    pair.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
     with mjhill.installed():
         result = mjhill.record(
-            pair, rest(pair), duration=0.3, excitation={"elbow_flexor": mjhill.step(0.7, 0.02)}
+            pair,
+            rest(pair),
+            duration=0.3,
+            every=every,
+            excitation={"elbow_flexor": mjhill.step(0.7, 0.02)},
         )
-    length = -result["elbow.angle"]
-    contractile = length - result["elbow_flexor.stretch"]
-    middle = slice(150, 280)  # past the stiff start
-    rate = -np.gradient(contractile, result.time)[middle]
-    np.testing.assert_allclose(result["elbow_flexor.velocity"][middle], rate, atol=0.05)
+    for name, gear in (("elbow_flexor", -1), ("elbow_extensor", 1)):
+        contractile = gear * result["elbow.angle"] - result[f"{name}.stretch"]
+        mean = -np.diff(contractile) / np.diff(result.time)
+        np.testing.assert_allclose(result[f"{name}.velocity"][1:], mean, rtol=0, atol=1e-11)
+    assert result["elbow_flexor.velocity"].max() > 3
+
+
+@pytest.mark.parametrize("integrator", ["EULER", "IMPLICITFAST", "IMPLICIT"])
+def test_a_run_that_goes_on_begins_with_the_velocity_of_the_step_before(pair, integrator):
+    pair.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
+    with mjhill.installed():
+        data = rest(pair)
+        first = mjhill.record(pair, data, duration=0.1, excitation={"elbow_flexor": 0.7})
+        second = mjhill.record(pair, data, duration=0.1)
+    for name in ("elbow_flexor.velocity", "elbow_extensor.velocity"):
+        assert second[name][0] == pytest.approx(first[name][-1], rel=1e-9)
+    assert second["elbow_flexor.velocity"][0] > 1
+
+
+def test_under_rk4_a_run_begins_with_the_velocity_of_that_moment(pair, muscle):
+    pair.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    with mjhill.installed():
+        data = rest(pair)
+        mjhill.record(pair, data, duration=0.1, excitation={"elbow_flexor": 0.7})
+        second = mjhill.record(pair, data, duration=0.1)
+    stretch, angle = second["elbow_flexor.stretch"][0], second["elbow.angle"][0]
+    expected = shortening_velocity(muscle, second["elbow_flexor.a"][0], -angle, stretch)
+    assert second["elbow_flexor.velocity"][0] == pytest.approx(expected, rel=1e-9)
+    assert expected > 1
 
 
 def test_recording_every_few_steps_keeps_those_steps(pair):
