@@ -42,18 +42,16 @@ def averages(p: float, q: float) -> tuple[float, float]:
     return share * q * (q + p * (1.0 / 6.0)), share * (q * 0.5 + p * (1.0 / 6.0))
 
 
-def advance_excitation(
-    u: float, n: float, a: float, tau_nex: float, tau: float, dt: float
-) -> tuple[float, float]:
-    """Excitation and activation after dt [s] at constant input u.
+def advance_excitation(u: float, n: float, tau_nex: float, dt: float) -> float:
+    """Excitation after dt [s] at constant input u; exact."""
+    return u + (n - u) * exp(-dt / tau_nex)
 
-    n is exact. a, of time constant tau, is exact for an n that is linear in time over the step.
-    """
-    n_next = u + (n - u) * exp(-dt / tau_nex)
+
+def advance_activation(n: float, n_next: float, a: float, tau: float, dt: float) -> float:
+    """Activation after dt [s]; exact for an excitation linear in time from n to n_next."""
     decay = exp(-(dt / tau))
     settled = 1.0 - decay
-    a_next = decay * a + settled * n + (n_next - n) * (1.0 - settled * tau * (1.0 / dt))
-    return n_next, a_next
+    return decay * a + settled * n + (n_next - n) * (1.0 - settled * tau * (1.0 / dt))
 
 
 def stretch_rate(
@@ -339,8 +337,10 @@ def muscle_rates(
             slope_ratio, viscosity, stretch_max, shape, limit, dt,
         )  # fmt: skip
         return n_rate, a_rate, length_rate - rate
-    tau = tau_act if source >= a else tau_deact
-    n_next, a_next = advance_excitation(u, source, a, tau_nex, tau, dt)
+    n_next = advance_excitation(u, source, tau_nex, dt)
+    # not n: at the onset of a release from steady state n is still equal to a
+    tau = tau_act if source + n_next >= 2.0 * a else tau_deact
+    a_next = advance_activation(source, n_next, a, tau, dt)
     length_then = length - dt * length_rate
     a_then = a - (n - a) * (dt / tau)
     if stimulated > 0:  # n is the input of the step before, so it can be undone exactly
