@@ -197,14 +197,24 @@ def divided_stretch(
             stretch, length_rate, now, gain, max_velocity, share, hill, plateau, slope_ratio,
             viscosity, stretch_max, shape, limit, time,
         )  # fmt: skip
-        _, p, _, _, stiffness, _ = stretch_rate(
+        _, p, _, _, stiffness, force = stretch_rate(
             stretch, length_rate, now, max_velocity, share, hill, plateau, slope_ratio,
             viscosity, stretch_max, shape, limit,
         )  # fmt: skip
-        rate, new_p, new_q, _, new_stiffness, _ = stretch_rate(
+        rate, new_p, new_q, _, new_stiffness, new_force = stretch_rate(
             stretch + change, length_rate, now + gain, max_velocity, share, hill, plateau,
             slope_ratio, viscosity, stretch_max, shape, limit,
         )  # fmt: skip
+        if force > now and new_force > now + gain and change > length_rate * time:
+            # a muscle that gives way cannot shorten: its plateau has risen away above the force
+            change, end, _, _ = linear_change(
+                stretch, length_rate, now, 0.0, max_velocity, share, hill, plateau, slope_ratio,
+                viscosity, stretch_max, shape, limit, time,
+            )  # fmt: skip
+            rate, new_p, new_q, _, new_stiffness, _ = stretch_rate(
+                stretch + change, length_rate, now + gain, max_velocity, share, hill, plateau,
+                slope_ratio, viscosity, stretch_max, shape, limit,
+            )  # fmt: skip
         # what the linear equation has missed at the end of the part
         missed = time * (rate - end / q)
         _, growing = averages(time * p / q, 1.0)

@@ -10,8 +10,6 @@ from mjhill.cli import main
 
 COUNT = 100
 TIMESTEPS = (1e-3, 2e-3, 5e-3)
-# MuJoCo's own step of the plant sets a floor, which counts where it is more than the limit
-FLOOR = 1.5
 
 
 def steady(outcomes, integrator, timestep):
@@ -34,7 +32,7 @@ def spread(outcomes):
 
 def check(outcomes, integrator, timestep, most):
     for o in steady(outcomes, integrator, timestep):
-        assert o.error <= max(most, FLOOR * (o.floor or 0.0)), o
+        assert o.error <= max(most, sweep.FLOOR * (o.floor or 0.0)), o
 
 
 @pytest.mark.parametrize("kind", KINDS)
