@@ -5,6 +5,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from html.parser import HTMLParser
 from pathlib import Path
@@ -19,6 +20,7 @@ from mjhill.cli import main
 from mjhill.reproduction import CATALOGUE, Entry, report_of, reproduce, select, write_report
 from mjhill.reproduction.fingerprint import sources
 from mjhill.reproduction.part import film_speed
+from mjhill.reproduction.process import uninterrupted
 from mjhill.reproduction.words import difference, duration, number, published
 
 TESTS = Path(__file__).parent
@@ -387,3 +389,24 @@ def test_differences_are_taken_to_the_nearest_end_of_a_range():
         "3 min 20 s",
         "2 min",
     ]
+
+
+def test_ctrl_c_waits_though_another_thread_takes_the_signal():
+    idle = threading.Event()
+    other = threading.Thread(target=idle.wait)  # it does not block the signal
+    other.start()
+    reached = []
+
+    def interrupted():
+        with uninterrupted():
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.2)
+            reached.append(True)
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            interrupted()
+    finally:
+        idle.set()
+        other.join()
+    assert reached

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import signal
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Iterator
@@ -91,11 +92,20 @@ def uninterrupted() -> Iterator[None]:
 
     Ctrl-C reaches every process of a terminal, and what is to end is for one of them to say.
     """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    waiting: list[int] = []
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # those started inherit it
+    # a blocked signal goes to another thread, such as one of a numerical library, and would be
+    # raised here all the same
+    handled = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, lambda *_: waiting.append(1)) if handled else None
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        if handled:
+            signal.signal(signal.SIGINT, before)
+        if waiting:
+            signal.raise_signal(signal.SIGINT)
 
 
 def start(part: Part, workplace: Path, *, fingerprint: str, video: bool) -> Worker:
