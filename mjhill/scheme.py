@@ -178,6 +178,7 @@ def divided_stretch(
     plateau or the element goes slack, the step is divided.
     """
     elapsed, part = 0.0, 1.0  # in units of dt
+    held = False  # whether the hypothetical force is
     for trial in range(2 * PATIENCE):
         now = before + (after - before) * elapsed
         if stretch < 0:  # slack is taken up at its mean rate, to the moment it is taut
@@ -194,8 +195,8 @@ def divided_stretch(
             continue
         gain, time = (after - before) * part, part * dt
         change, end, q, _ = linear_change(
-            stretch, length_rate, now, gain, max_velocity, share, hill, plateau, slope_ratio,
-            viscosity, stretch_max, shape, limit, time,
+            stretch, length_rate, now, 0.0 if held else gain, max_velocity, share, hill, plateau,
+            slope_ratio, viscosity, stretch_max, shape, limit, time,
         )  # fmt: skip
         _, p, _, _, stiffness, force = stretch_rate(
             stretch, length_rate, now, max_velocity, share, hill, plateau, slope_ratio,
@@ -205,20 +206,15 @@ def divided_stretch(
             stretch + change, length_rate, now + gain, max_velocity, share, hill, plateau,
             slope_ratio, viscosity, stretch_max, shape, limit,
         )  # fmt: skip
-        if force > now and new_force > now + gain and change > length_rate * time:
-            # a muscle that gives way cannot shorten: its plateau has risen away above the force
-            change, end, _, _ = linear_change(
-                stretch, length_rate, now, 0.0, max_velocity, share, hill, plateau, slope_ratio,
-                viscosity, stretch_max, shape, limit, time,
-            )  # fmt: skip
-            rate, new_p, new_q, _, new_stiffness, _ = stretch_rate(
-                stretch + change, length_rate, now + gain, max_velocity, share, hill, plateau,
-                slope_ratio, viscosity, stretch_max, shape, limit,
-            )  # fmt: skip
+        # a muscle that gives way cannot shorten: its plateau has risen away above the force
+        if not held and force > now and new_force > now + gain and change > length_rate * time:
+            held = True
+            continue
         # what the linear equation has missed at the end of the part
         missed = time * (rate - end / q)
         _, growing = averages(time * p / q, 1.0)
         _, slower = averages(time * min(p / q, new_p / new_q), 1.0)
+        held = False
         error = abs(missed) * slower * max(stiffness, new_stiffness)
         if error > TOLERANCE and trial < PATIENCE:
             part *= max(0.1, 0.8 * sqrt(TOLERANCE / error))
