@@ -194,7 +194,7 @@ def bench(
 ) -> None:
     """Measure accuracy, cost, threads, start and video, or those of NAMES.
 
-    With the name sweep: random systems against the reference solver, about 5 minutes.
+    With the name sweep: random systems against the reference solver, about 2 minutes.
     """
     from mjhill import bench as benchmarks
 
