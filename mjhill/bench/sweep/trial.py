@@ -66,7 +66,8 @@ def solve(case: Case) -> Truth:
         positions, forces = _positions(case, recording), _forces(case, recording)
         base = positions
         runs = [
-            _positions(case, _reference(other, _PUSHED_LOOSER)) for other in _pushed(case, positions)
+            _positions(case, _reference(other, _PUSHED_LOOSER))
+            for other in _pushed(case, positions)
         ]
     most = max(float(np.abs(pushed - base).max()) for pushed in runs)
     return Truth(case, positions, forces, most / (PUSH * float(np.ptp(positions, axis=0).max())))
