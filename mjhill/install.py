@@ -7,54 +7,38 @@ passed on to what was installed before.
 
 from __future__ import annotations
 
-import ctypes
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from typing import Any, Literal, get_args
 
 import mujoco
 
 from mjhill.callbacks import python as python_backend
-from mjhill.callbacks.structs import mujoco_library
+from mjhill.callbacks.slots import (
+    NAMES,
+    PROCESS,
+    TYPES,
+    Slot,
+    global_pointer,
+    is_automatic,
+    read,
+    restore,
+)
 
 Backend = Literal["compiled", "python"]
 
-_NAMES = ("act_dyn", "act_bias", "passive")
-_ACTUATOR = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
-_GENERIC = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-_TYPES: dict[str, Any] = {"act_dyn": _ACTUATOR, "act_bias": _ACTUATOR, "passive": _GENERIC}
-_C_FUNCTION: Any = _GENERIC.__mro__[1]  # the base of every ctypes function
-_lock = threading.RLock()
-
-
-@dataclass(frozen=True)
-class _Slot:
-    """What one callback held: the C pointer, and the object that MuJoCo's bindings hold for it."""
-
-    pointer: int | None
-    holder: Any
-
-    @property
-    def is_python(self) -> bool:
-        """Whether the callback is a Python function, reached through the bindings."""
-        return (
-            self.pointer is not None
-            and callable(self.holder)
-            and not isinstance(self.holder, _C_FUNCTION)
-        )
+_lock = PROCESS.lock
+_stack: list[_Installation] = PROCESS.installations
 
 
 @dataclass(frozen=True)
 class _Installation:
     backend: Backend
-    before: dict[str, _Slot]
-    ours: dict[str, _Slot]
-
-
-_stack: list[_Installation] = []
+    before: dict[str, Slot]
+    ours: dict[str, Slot]
+    served: dict[str, Slot]
 
 
 def install(backend: Backend = "compiled") -> None:
@@ -79,16 +63,16 @@ def install(backend: Backend = "compiled") -> None:
     with _lock:
         if _stack:
             _check_still_ours(_stack[-1])
-        before = {name: _read(name) for name in _NAMES}
+        before = {name: read(name) for name in NAMES}
         # what serves others is what stood there before our first installation
-        served = _stack[0].before if _stack else before
+        served = _stack[0].served if _stack else _others(before)
         try:
             (_put_compiled if backend == "compiled" else _put_python)(served)
         except BaseException:
-            _restore(before)
+            restore(before)
             raise
-        ours = {name: _read(name) for name in _NAMES}
-        _stack.append(_Installation(backend, before, ours))
+        ours = {name: read(name) for name in NAMES}
+        _stack.append(_Installation(backend, before, ours, served))
 
 
 def uninstall() -> None:
@@ -103,7 +87,7 @@ def uninstall() -> None:
             raise RuntimeError("mjhill is not installed; call mjhill.install() first")
         installation = _stack.pop()
         replaced = _replaced(installation)
-        _restore(installation.before)
+        restore(installation.before)
     if replaced:
         raise RuntimeError(
             f"{_listed(replaced)} replaced while mjhill was installed, and now removed; "
@@ -132,14 +116,14 @@ def installed(backend: Backend = "compiled") -> Iterator[None]:
 
 
 def installed_backend() -> Backend | None:
-    """The back-end now in place, or None.
+    """The back-end now in place, or None; ``"compiled"`` where autoload has put it there.
 
     Raises:
         RuntimeError: A callback was replaced since it was installed.
     """
     with _lock:
         if not _stack:
-            return None
+            return "compiled" if is_automatic() else None
         _check_still_ours(_stack[-1])
         return _stack[-1].backend
 
@@ -148,31 +132,40 @@ def installed_backend() -> Backend | None:
 def without_python_callbacks() -> Iterator[None]:
     """Take Python callbacks out while a model is compiled, which they would make fail."""
     with _lock:
-        present = {name: _read(name) for name in _NAMES}
+        present = {name: read(name) for name in NAMES}
         held = {name: slot for name, slot in present.items() if slot.is_python}
         try:
             for name in held:
-                _global(name).value = None
+                global_pointer(name).value = None
             yield
         finally:
             for name, slot in held.items():
-                _global(name).value = slot.pointer
+                global_pointer(name).value = slot.pointer
 
 
-def _put_compiled(served: dict[str, _Slot]) -> None:
+def _others(before: dict[str, Slot]) -> dict[str, Slot]:
+    """What callbacks held, with what they held before ours for those put there by autoload."""
+    ours = PROCESS.automatic
+    return {
+        name: PROCESS.served[name] if slot.pointer in ours.get(name, ()) else slot
+        for name, slot in before.items()
+    }
+
+
+def _put_compiled(served: dict[str, Slot]) -> None:
     compiled = _compiled()
-    for index, name in enumerate(_NAMES):
+    for index, name in enumerate(NAMES):
         compiled.chain[index] = served[name].pointer
-        function = _TYPES[name](getattr(compiled, name))
+        function = TYPES[name](getattr(compiled, name))
         if served[name].is_python:
             # the bindings must go on holding the Python function that we pass on to
-            _global(name).value = getattr(compiled, name)
+            global_pointer(name).value = getattr(compiled, name)
         else:
             getattr(mujoco, f"set_mjcb_{name}")(function)
 
 
-def _put_python(served: dict[str, _Slot]) -> None:
-    for name in _NAMES:
+def _put_python(served: dict[str, Slot]) -> None:
+    for name in NAMES:
         next_ = _callable(name, served[name])
         if name == "passive":
             function: Callable[..., Any] = partial(_passive, next_)
@@ -200,24 +193,14 @@ def _passive(next_: Callable[..., None] | None, model: mujoco.MjModel, data: muj
     python_backend.passive(model, data)
 
 
-def _callable(name: str, slot: _Slot) -> Callable[..., Any] | None:
+def _callable(name: str, slot: Slot) -> Callable[..., Any] | None:
     """What a slot held, as a Python function of model, data and, for actuators, the id."""
     if slot.pointer is None:
         return None
     if slot.is_python:
         return slot.holder  # type: ignore[no-any-return]
-    function = _TYPES[name](slot.pointer)
+    function = TYPES[name](slot.pointer)
     return lambda model, data, *actuator: function(model._address, data._address, *actuator)
-
-
-def _read(name: str) -> _Slot:
-    return _Slot(_global(name).value, getattr(mujoco, f"get_mjcb_{name}")())
-
-
-def _restore(slots: dict[str, _Slot]) -> None:
-    for name, slot in slots.items():
-        getattr(mujoco, f"set_mjcb_{name}")(slot.holder)
-        _global(name).value = slot.pointer
 
 
 def _replaced(installation: _Installation) -> list[str]:
@@ -225,7 +208,7 @@ def _replaced(installation: _Installation) -> list[str]:
 
     All Python callbacks share one C pointer, so there the function itself is compared.
     """
-    now = {name: _read(name) for name in _NAMES}
+    now = {name: read(name) for name in NAMES}
     return [
         name
         for name, slot in installation.ours.items()
@@ -248,12 +231,10 @@ def _listed(names: list[str]) -> str:
     return f"{callbacks} {'was' if len(names) == 1 else 'were'}"
 
 
-def _global(name: str) -> ctypes.c_void_p:
-    return ctypes.c_void_p.in_dll(mujoco_library(), f"mjcb_{name}")
-
-
-@cache
 def _compiled() -> Any:
-    from mjhill.callbacks.machine_code import build
+    """The machine code, linked once in the process."""
+    if PROCESS.linked is None:
+        from mjhill.callbacks.machine_code import build
 
-    return build()
+        PROCESS.linked = build()
+    return PROCESS.linked

@@ -1,10 +1,13 @@
 import ctypes
+import os
+
+os.environ["MJHILL_AUTOLOAD"] = "0"  # tests install what they need; test_autoload takes it out
 
 import mujoco
 import pytest
 
 import mjhill
-from mjhill.callbacks.structs import mujoco_library
+from mjhill.callbacks.slots import mujoco_library
 from mjhill.spec import joint_spec
 
 CALLBACKS = ("mjcb_act_dyn", "mjcb_act_bias", "mjcb_passive")

@@ -111,3 +111,10 @@ def test_the_module_runs_as_a_program():
         [sys.executable, "-m", "mjhill", "--version"], capture_output=True, text=True, check=True
     )
     assert mjhill.__version__ in run.stdout
+
+
+@pytest.mark.parametrize("command", [None, *main.commands])
+def test_every_command_explains_itself(command):
+    run = CliRunner().invoke(main, [command, "--help"] if command else ["--help"])
+    assert run.exit_code == 0, run.output
+    assert run.output.startswith("Usage:")

@@ -7,21 +7,18 @@ code is kept under a fingerprint of all that it is made from.
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import hashlib
-import os
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import llvmlite.binding as llvm
-import numpy as np
 
-from mjhill.callbacks.structs import mujoco_library, verify_fields
-from mjhill.files import replacing
+from mjhill.callbacks import code_cache
+from mjhill.callbacks.slots import mujoco_library
+from mjhill.callbacks.structs import verify_fields
 
 CHAIN_SYMBOL = "mjhill_chained_callbacks"  # three pointers: act_dyn, act_bias, passive
 READ_CONTROL = "mj_readCtrl"
@@ -29,8 +26,6 @@ _UNUSED = (ctypes.c_void_p * 3)()
 _NAMES = ("act_dyn", "act_bias", "passive")
 _SOURCES = Path(__file__).parent.parent
 _MADE_FROM = ("elements.py", "scheme.py", "layout.py", "callbacks/*.py")
-
-_Code = dict[str, tuple[str, bytes]]  # name: symbol and object code
 
 
 @dataclass(frozen=True)
@@ -61,25 +56,25 @@ def build() -> MachineCode:
     verify_fields()
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    path = cache_folder() / f"{_fingerprint()}.npz"
-    code = _read(path)
-    if code is None:
-        from mjhill.callbacks.compiled import compile_callbacks
-
-        # numba links what it compiles, though what it links is not what runs
-        llvm.add_symbol(CHAIN_SYMBOL, ctypes.addressof(_UNUSED))
-        llvm.add_symbol(READ_CONTROL, _read_control())
-        code = compile_callbacks()
-        _write(path, code)
+    folder = code_cache.safe_folder()
+    if folder is None:
+        return _link(_compile())
+    path = folder / f"{_fingerprint()}.code"
+    with code_cache.alone(path):
+        code = code_cache.read(path, _NAMES)
+        if code is None:
+            code = _compile()
+            code_cache.write(path, code)
     return _link(code)
 
 
-def cache_folder() -> Path:
-    """Where machine code is kept: ``MJHILL_CACHE_DIR``, or the user's folder for caches."""
-    from platformdirs import user_cache_path
+def _compile() -> code_cache.Code:
+    from mjhill.callbacks.compiled import compile_callbacks
 
-    given = os.environ.get("MJHILL_CACHE_DIR")
-    return Path(given) if given else user_cache_path("mjhill")
+    # numba links what it compiles, though what it links is not what runs
+    llvm.add_symbol(CHAIN_SYMBOL, ctypes.addressof(_UNUSED))
+    llvm.add_symbol(READ_CONTROL, _read_control())
+    return compile_callbacks()
 
 
 def _fingerprint() -> str:
@@ -95,30 +90,7 @@ def _fingerprint() -> str:
     return digest.hexdigest()[:24]
 
 
-def _read(path: Path) -> _Code | None:
-    """Code from the cache; None if it is not there, or damaged."""
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            return {
-                name: (str(archive[f"{name}_symbol"]), archive[name].tobytes()) for name in _NAMES
-            }
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile):
-        return None
-
-
-def _write(path: Path, code: _Code) -> None:
-    """Keep code in the cache, where there is a place that can be written."""
-    arrays: dict[str, Any] = {}
-    for name, (symbol, object_code) in code.items():
-        arrays[name] = np.frombuffer(object_code, dtype=np.uint8)
-        arrays[f"{name}_symbol"] = np.array(symbol)
-    with contextlib.suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as partial:
-            np.savez(partial, allow_pickle=False, **arrays)
-
-
-def _link(code: _Code) -> MachineCode:
+def _link(code: code_cache.Code) -> MachineCode:
     chain = (ctypes.c_void_p * len(_NAMES))()
     jit = llvm.create_lljit_compiler()
     address, libraries = {}, []

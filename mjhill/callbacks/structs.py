@@ -37,14 +37,6 @@ FIELDS = [
 
 
 @cache
-def mujoco_library() -> ctypes.CDLL:
-    """The MuJoCo library that the Python package has loaded."""
-    from mujoco import _functions
-
-    return ctypes.CDLL(_functions.__file__)
-
-
-@cache
 def offset(path: str) -> int:
     """Byte offset of a field such as ``mjModel.opt.timestep`` from the start of its struct.
 

@@ -23,6 +23,8 @@ class _Group(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
+        except (click.exceptions.Exit, click.exceptions.Abort):
+            raise  # --help ends in one, an interrupt in the other; both are RuntimeErrors
         except (ValueError, TypeError, KeyError) as error:
             self._fail(error, code=2)  # the input was wrong
         except (RuntimeError, OSError) as error:

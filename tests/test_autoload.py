@@ -1,0 +1,262 @@
+import os
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+import mjhill
+
+RUN = """
+m = mujoco.MjModel.from_xml_path({path!r})
+d = mujoco.MjData(m)
+d.ctrl[0] = 0.5
+mujoco.mj_step(m, d, nstep=200)
+print(d.qpos[0].hex(), d.act[2].hex())
+"""
+
+
+def python(code, **environment):
+    """What a process of its own prints: standard output and standard error."""
+    kept = {k: v for k, v in os.environ.items() if k != "MJHILL_AUTOLOAD"}
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)],
+        capture_output=True, text=True, env=kept | environment, check=False, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip(), done.stderr.strip()
+
+
+@pytest.fixture(scope="module")
+def elbow():
+    return str(mjhill.model_path("elbow"))
+
+
+@pytest.fixture(scope="module")
+def expected(elbow):
+    run, _ = python(
+        f"import mujoco, mjhill\nwith mjhill.installed():{textwrap.indent(RUN, ' ')}".format(
+            path=elbow
+        ),
+        MJHILL_AUTOLOAD="0",
+    )
+    return run
+
+
+@pytest.mark.parametrize(
+    "first",
+    [
+        "import mujoco",
+        "import mujoco, mjhill",
+        "import mjhill, mujoco",
+        "import mjhill.layout, mujoco",
+        "import mujoco.rollout",
+    ],
+)
+def test_a_process_that_never_installs_has_the_muscle(elbow, expected, first):
+    assert python(first + RUN.format(path=elbow)) == (expected, "")
+
+
+def test_it_can_be_switched_off(elbow, expected):
+    limp, _ = python("import mujoco" + RUN.format(path=elbow), MJHILL_AUTOLOAD="0")
+    assert limp != expected
+    assert limp.endswith("0x0.0p+0")
+
+
+def test_import_is_light_and_a_model_without_muscles_compiles_nothing():
+    code = """
+    import mujoco, sys
+    heavy = {"llvmlite", "numba", "scipy", "matplotlib", "mujoco.introspect"}
+    print(sorted(heavy & set(sys.modules)))
+    m = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>")
+    mujoco.mj_step(m, mujoco.MjData(m))
+    from mjhill.callbacks.slots import PROCESS
+    print("numba" in sys.modules, len(PROCESS.automatic["act_dyn"]))
+    """
+    assert python(code)[0].split("\n") == ["[]", "False 1"]
+
+
+def test_passive_elasticity_alone_works_too(elbow):
+    code = f"""
+    import mujoco
+    spec = mujoco.MjSpec.from_file({elbow!r})
+    for actuator in list(spec.actuators):
+        spec.delete(actuator)
+    for key in list(spec.keys):
+        spec.delete(key)
+    m = spec.compile()
+    d = mujoco.MjData(m)
+    d.qpos[0] = 2.9
+    mujoco.mj_forward(m, d)
+    print(d.qfrc_passive[0].hex())
+    """
+    installed = code.replace("import mujoco\n", "import mujoco, mjhill\n    mjhill.install()\n")
+    assert python(code) == python(installed, MJHILL_AUTOLOAD="0")
+
+
+def test_rollout_and_batch_on_threads_have_the_muscle(elbow):
+    code = f"""
+    import mujoco, mujoco.batch, mujoco.rollout, numpy as np
+    m = mujoco.MjModel.from_xml_path({elbow!r})
+    full = mujoco.mjtState.mjSTATE_FULLPHYSICS
+    data = [mujoco.MjData(m) for _ in range(2)]
+    start = np.empty(mujoco.mj_stateSize(m, full))
+    mujoco.mj_getState(m, data[0], start, full)
+    states, _ = mujoco.rollout.rollout(
+        m, data, np.tile(start, (8, 1)), np.full((8, 100, 2), 0.3))
+    batch = mujoco.batch.Batch(m, nsim=4)
+    batch.ctrl[:] = 0.3
+    batch.step(nstep=100)
+    print(set(states[:, -1, 1].tolist()) == set(batch.qpos[:, 0].tolist()), states[0, -1, 1] != 0)
+    """
+    assert python(code) == ("True True", "")
+
+
+def test_spawned_workers_give_the_result_of_one_process_bit_for_bit(tmp_path):
+    pytest.importorskip("gymnasium")
+    (tmp_path / "arm.py").write_text(
+        textwrap.dedent(
+            f"""
+            import gymnasium, mujoco, numpy as np
+
+            class Arm(gymnasium.Env):
+                observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (1,), np.float64)
+                action_space = gymnasium.spaces.Box(0, 1, (2,), np.float64)
+
+                def __init__(self):
+                    self.model = mujoco.MjModel.from_xml_path({str(mjhill.model_path("elbow"))!r})
+                    self.data = mujoco.MjData(self.model)
+
+                def reset(self, seed=None, options=None):
+                    mujoco.mj_resetData(self.model, self.data)
+                    return self.data.qpos.copy(), {{}}
+
+                def step(self, action):
+                    self.data.ctrl[:] = action
+                    mujoco.mj_step(self.model, self.data, nstep=10)
+                    return self.data.qpos.copy(), 0.0, False, False, {{}}
+
+            if __name__ == "__main__":
+                actions = np.random.default_rng(1).uniform(0, 1, (20, 2, 2))
+                ends = []
+                for vector in (
+                    gymnasium.vector.AsyncVectorEnv([Arm, Arm], context="spawn"),
+                    gymnasium.vector.SyncVectorEnv([Arm, Arm]),
+                ):
+                    vector.reset()
+                    for action in actions:
+                        seen = vector.step(action)[0]
+                    ends.append(seen.tobytes())
+                    vector.close()
+                print(ends[0] == ends[1], abs(seen).min() > 0)
+            """
+        )
+    )
+    kept = {k: v for k, v in os.environ.items() if k != "MJHILL_AUTOLOAD"}
+    done = subprocess.run(
+        [sys.executable, "arm.py"], cwd=tmp_path, env=kept, capture_output=True, text=True,
+        check=False, timeout=300,
+    )  # fmt: skip
+    assert done.stdout.strip() == "True True", done.stderr
+
+
+def test_a_muscle_that_cannot_run_says_so_and_is_not_limp(elbow, tmp_path):
+    (tmp_path / "llvmlite").mkdir()
+    (tmp_path / "llvmlite" / "__init__.py").write_text("raise ImportError('no such compiler')")
+    code = f"""
+    import mujoco
+    m = mujoco.MjModel.from_xml_path({elbow!r})
+    d = mujoco.MjData(m)
+    mujoco.mj_forward(m, d)
+    print(d.actuator_force[0])
+    """
+    out, error = python(code, PYTHONPATH=str(tmp_path))
+    assert out == "nan"
+    assert "mjhill: the muscle cannot run, its forces are not numbers: no such compiler" in error
+
+
+def test_installing_over_it_and_undoing_that_adds_nothing_twice(elbow, expected):
+    code = "import mujoco, mjhill\nprint(mjhill.installed_backend())\n"
+    for backend in ("compiled", "python"):
+        code += f"with mjhill.installed({backend!r}):\n"
+        code += " m = mjhill.load('elbow')\n print(mjhill.installed_backend())\n"
+        code += " d = mujoco.MjData(m); d.qpos[0] = 2.9; mujoco.mj_forward(m, d)\n"
+        code += " print(d.qfrc_passive[0])\n"
+    out, _ = python(code + RUN.format(path=elbow))
+    lines = out.split("\n")
+    assert lines[:2] == ["compiled", "compiled"]
+    assert lines[3] == "python"
+    assert float(lines[2]) == pytest.approx(float(lines[4]), rel=1e-12)
+    assert lines[5] == expected
+
+
+def test_a_recording_needs_no_installation_but_refuses_where_the_callbacks_were_replaced():
+    code = """
+    import mujoco, mjhill
+    m = mjhill.load("elbow")
+    run = mjhill.record(m, mjhill.at_home(m), duration=0.01)
+    print(run.about["backend"])
+    mujoco.set_mjcb_passive(None)
+    try:
+        mjhill.record(m, mjhill.at_home(m), duration=0.01)
+    except RuntimeError as error:
+        print(error)
+    """
+    lines = python(code)[0].split("\n")
+    assert lines[0] == "compiled"
+    assert "no callbacks are installed" in lines[1]
+
+
+@pytest.mark.parametrize("automatic", ["0", "1"])
+@pytest.mark.parametrize(
+    "again",
+    [
+        "import importlib; importlib.reload(sys.modules['mjhill.install'])",
+        "[sys.modules.pop(k) for k in list(sys.modules) if k.startswith('mjhill')]",
+    ],
+)
+def test_code_outlives_a_reload_of_the_modules(elbow, expected, again, automatic):
+    code = f"""
+    import gc, sys, mujoco, mjhill
+    mjhill.install()
+    m = mjhill.load("elbow")
+    d = mujoco.MjData(m)
+    mujoco.mj_step(m, d)
+    {again}
+    del mjhill
+    gc.collect()
+    import mjhill
+    mujoco.mj_step(m, d)
+    mjhill.install()
+    """
+    out, _ = python(
+        textwrap.dedent(code) + RUN.format(path=elbow) + "print(mjhill.installed_backend())",
+        MJHILL_AUTOLOAD=automatic,
+    )
+    assert out.split("\n") == [expected, "compiled"]
+
+
+def test_a_fork_while_another_thread_installs_is_no_deadlock():
+    code = """
+    import os, threading, mjhill
+    stop = threading.Event()
+    def work():
+        while not stop.is_set():
+            with mjhill.installed():
+                pass
+    with mjhill.installed():
+        pass
+    thread = threading.Thread(target=work)
+    thread.start()
+    for _ in range(100):
+        child = os.fork()
+        if child == 0:
+            with mjhill.installed():
+                os._exit(0)
+        assert os.waitpid(child, 0)[1] == 0
+    stop.set()
+    thread.join()
+    print("done")
+    """
+    assert python(code, PYTHONWARNINGS="ignore")[0] == "done"
