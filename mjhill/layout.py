@@ -103,19 +103,38 @@ def turns(model: mujoco.MjModel, actuator: int) -> bool:
     return bool(on_joint and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE)
 
 
+def muscle_ids(model: mujoco.MjModel) -> list[int]:
+    """Actuator ids of the muscles of a model."""
+    found = (
+        (model.actuator_dyntype == int(mujoco.mjtDyn.mjDYN_USER))
+        & (model.actuator_dynprm[:, 0] == MUSCLE_TAG)
+        & (model.actuator_actnum == STATES)
+    )
+    return [int(i) for i in np.flatnonzero(found)]
+
+
 def actuator_names(model: mujoco.MjModel) -> list[str]:
     """Name of each actuator; one without a name is called ``actuator<id>``."""
-    return [model.actuator(i).name or f"actuator{i}" for i in range(model.nactuator)]
+    return _names(model, model.name_actuatoradr, "actuator")
 
 
 def joint_names(model: mujoco.MjModel) -> list[str]:
     """Name of each joint; one without a name is called ``joint<id>``."""
-    return [model.joint(i).name or f"joint{i}" for i in range(model.njnt)]
+    return _names(model, model.name_jntadr, "joint")
+
+
+def _names(model: mujoco.MjModel, starts: np.ndarray, kind: str) -> list[str]:
+    text = model.names
+    return [
+        text[start : text.index(b"\0", start)].decode() or f"{kind}{i}"
+        for i, start in enumerate(starts.tolist())
+    ]
 
 
 def muscle_names(model: mujoco.MjModel) -> list[str]:
     """Names of the muscles of a model, in the order of its actuators."""
-    return [name for i, name in enumerate(actuator_names(model)) if is_muscle(model, i)]
+    names = actuator_names(model)
+    return [names[i] for i in muscle_ids(model)]
 
 
 def address(model: mujoco.MjModel, name: str) -> Address:
@@ -124,17 +143,18 @@ def address(model: mujoco.MjModel, name: str) -> Address:
     Raises:
         ValueError: No muscle has this name; the message lists those there are.
     """
-    if name not in muscle_names(model):
-        known = ", ".join(muscle_names(model)) or "none"
+    names = muscle_names(model)
+    if name not in names:
+        known = ", ".join(names) or "none"
         raise ValueError(f"unknown muscle {name!r}; the model's muscles are: {known}")
-    return _address(model, actuator_names(model).index(name))
+    return _address(model, muscle_ids(model)[names.index(name)])
 
 
 def addresses(model: mujoco.MjModel) -> Iterator[tuple[str, Address]]:
     """Name and addresses of each muscle of a model."""
-    for actuator, name in enumerate(actuator_names(model)):
-        if is_muscle(model, actuator):
-            yield name, _address(model, actuator)
+    names = actuator_names(model)
+    for actuator in muscle_ids(model):
+        yield names[actuator], _address(model, actuator)
 
 
 def _address(model: mujoco.MjModel, actuator: int) -> Address:
@@ -161,8 +181,20 @@ def read_muscle(model: mujoco.MjModel, name: str) -> Muscle:
     Raises:
         ValueError: No muscle has this name, or a value is outside its bounds.
     """
-    i = address(model, name).actuator
-    rows = {array: getattr(model, f"actuator_{array}")[i] for array in _ARRAYS}
+    return _muscle(model, name, address(model, name).actuator)
+
+
+def read_muscles(model: mujoco.MjModel) -> dict[str, Muscle]:
+    """The parameters of all muscles by name.
+
+    Raises:
+        ValueError: A value is outside its bounds.
+    """
+    return {name: _muscle(model, name, at.actuator) for name, at in addresses(model)}
+
+
+def _muscle(model: mujoco.MjModel, name: str, actuator: int) -> Muscle:
+    rows = {array: getattr(model, f"actuator_{array}")[actuator] for array in _ARRAYS}
     values: dict[str, Any] = {
         parameter: float(rows[array][slot]) for parameter, (array, slot) in SLOTS.items()
     }
@@ -170,6 +202,12 @@ def read_muscle(model: mujoco.MjModel, name: str) -> Muscle:
         return Muscle(**values)
     except ValueError as error:
         raise ValueError(f"muscle {name!r}: {error}") from None
+
+
+def parameter_columns(model: mujoco.MjModel, actuators: list[int]) -> dict[str, np.ndarray]:
+    """Each parameter of the given muscles, shape (len(actuators),)."""
+    rows = {array: getattr(model, f"actuator_{array}")[actuators] for array in _ARRAYS}
+    return {name: rows[array][:, slot] for name, (array, slot) in SLOTS.items()}
 
 
 def write_muscle(model: mujoco.MjModel, name: str, muscle: Muscle) -> None:

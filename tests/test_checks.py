@@ -103,16 +103,16 @@ def test_rk4_warns_of_a_time_constant_that_it_cannot_follow(elbow, muscle):
     ).compile()
     model.opt.timestep = 5e-3
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    [finding] = [f for f in mjhill.check_model(model) if "tau" in f.quantity]
+    [finding] = [f for f in mjhill.check_model(model) if "tau" in f.problem]
     assert str(finding).startswith("muscle 'elbow_flexor': timestep over excitation_tau is 3.33")
     assert finding.timestep == pytest.approx(3e-3)
 
 
 def test_the_natural_frequency_is_that_of_the_series_elements_on_the_inertia(pair):
-    muscles = {name: mjhill.read_muscle(pair, name) for name in mjhill.muscle_names(pair)}
+    muscles = mjhill.layout.read_muscles(pair)
     for joint in range(pair.njnt):
         pair.jnt_user[joint] = 0.0  # no exponential elasticity
-    [(joint, frequency)] = natural_frequencies(pair, muscles)
+    [(joint, frequency)] = natural_frequencies(pair)
     stiffness = sum(
         m.max_isometric_force * m.series_shape / m.series_stretch / (1 - math.exp(-m.series_shape))
         for m in muscles.values()
