@@ -18,7 +18,7 @@ demo: $(READY)
 
 test: $(READY)
 	@.ci/graphics
-	@$(RUN)/pytest -n 2 -q $(TESTS)
+	@$(RUN)/pytest -n 2 --dist worksteal -q $(TESTS)
 
 check: $(READY)
 	@$(RUN)/ruff format --check .

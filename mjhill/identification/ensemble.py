@@ -112,6 +112,7 @@ def _batch(
     """A simulation for each joint, its muscles steady at the start, on all threads by default."""
     spec = joint_spec(joints[0])
     spec.option.timestep = timestep
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT  # there are none to look for
     with without_python_callbacks():
         model = spec.compile()
     batch = mujoco.batch.Batch(model, nsim=len(joints), nthread=threads)
