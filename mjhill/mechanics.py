@@ -175,15 +175,17 @@ def model_mechanics(
     if every > 1:
         return
     arrays, velocities = samples.arrays, samples.arrays["qvel"]
+    if arrays["qfrc_applied"].any() or samples.pushed.any():
+        applied = path.work_at(arrays["qfrc_applied"], velocities, held=True)
+        yield "external_work", applied + path.work_at(samples.pushed, velocities)
     works = {
-        "damping_loss": (-_present(arrays["qfrc_damper"], path), False),
-        "external_work": (arrays["qfrc_applied"] + samples.pushed, True),
-        "constraint_work": (arrays["qfrc_constraint"], False),
-        "other_work": (_other_forces(model, samples), False),
+        "damping_loss": -_present(arrays["qfrc_damper"], path),
+        "constraint_work": arrays["qfrc_constraint"],
+        "other_work": _other_forces(model, samples),
     }
-    for name, (forces, held) in works.items():
+    for name, forces in works.items():
         if forces.any():
-            yield name, path.work_at(forces, velocities, held)
+            yield name, path.work_at(forces, velocities)
 
 
 def _other_springs(model: mujoco.MjModel, samples: Samples) -> _Values:

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.parameters import Muscle
-from mjhill.recording import Recording, shown
+from mjhill.recording import Recording
 
 FASTEST = 1.5  # V_max
 _MARGIN = 1.05  # on what elements carry: the scheme is off by less
+_LEAD = 0.01  # of the series element's stretch at F_max
 
 _Values = NDArray[np.float64]
 
@@ -57,7 +58,7 @@ class Transient:
             "push": f"a force of {self.value:.4g} {self.unit}: it pushes, and a muscle only pulls",
         }[self.kind]
         return (
-            f"muscle {shown(self.muscle)!r} did what no muscle can at {self.time:.6g} s: {what} "
+            f"muscle {self.muscle!r} did what no muscle can at {self.time:.6g} s: {what} "
             f"({often}{self.cause}); {self.remedy}"
         )
 
@@ -68,11 +69,11 @@ def transients(recording: Recording) -> tuple[Transient, ...]:
     - *force*: more than the contractile element can hold, F_max times the eccentric plateau and
       what its viscosity adds at the fastest lengthening that the joints have yet made.
     - *velocity*: the contractile element shortens faster than 1.5 V_max, or lengthens faster than
-      that without a movement of the joints that would stretch it so.
+      that without a cause.
     - *push*: a force below 0.
 
-    A muscle that the joints stretch faster than V_max is no finding: an antagonist of a fast
-    movement is.
+    Causes of lengthening are joints that move, as in the antagonist of a fast movement, and a
+    series element that recoils while the muscle relaxes. Both can be faster than V_max.
 
     Args:
         recording: What ``record`` returned; muscles whose parameters it does not hold are skipped.
@@ -93,6 +94,9 @@ def _of_muscle(recording: Recording, name: str, muscle: Muscle) -> Iterator[Tran
     tension = recording.series.get(f"{name}.tension", force)
     velocity, rate = recording[f"{name}.velocity"], recording[f"{name}.length_rate"]
     fastest = FASTEST * muscle.max_velocity
+    if recording.about.get("integrator") == "mjINT_RK4" and len(recording) > 1:
+        # its force is that of a stretch a little later, see staged_stretch; not always equally so
+        fastest += _LEAD * muscle.series_stretch / float(np.diff(recording.time).min())
     before = np.concatenate((rate[:1], rate[:-1]))
     # the least that V_max can scale to
     slowest = muscle.max_velocity * (
@@ -102,12 +106,12 @@ def _of_muscle(recording: Recording, name: str, muscle: Muscle) -> Iterator[Tran
     carried = muscle.max_isometric_force * (
         _MARGIN * muscle.eccentric_plateau + muscle.viscosity * stretched
     )
-    moved = np.maximum(np.maximum(rate, before), 0.0)
     checks = {  # values, what they have too much, what is possible
         "force": (tension, tension - carried, carried),
         "velocity": (
             velocity,
-            np.maximum(velocity - fastest, -velocity - fastest - moved),
+            np.maximum(velocity, -velocity - _explained(recording, name, tension <= carried))
+            - fastest,
             np.copysign(fastest, velocity),
         ),
         "push": (force, -force - 1e-9 * muscle.max_isometric_force, np.zeros_like(force)),
@@ -124,6 +128,19 @@ def _of_muscle(recording: Recording, name: str, muscle: Muscle) -> Iterator[Tran
             recording.units[f"{name}.{'velocity' if kind == 'velocity' else 'force'}"],
             int(beyond.sum()), float(recording.time[np.argmax(beyond)]), cause, remedy,
         )  # fmt: skip
+
+
+def _explained(recording: Recording, name: str, sound: NDArray[np.bool_]) -> _Values:
+    """Lengthening of the contractile element that has a cause [rad/s or m/s], shape (T,).
+
+    The joints move, or the series element recoils from a force that was ``sound``.
+    """
+    rate, stretch = recording[f"{name}.length_rate"], recording[f"{name}.stretch"]
+    before = np.concatenate((rate[:1], rate[:-1]))
+    recoil = np.where(sound[:-1], -np.diff(stretch) / np.diff(recording.time), 0.0)
+    at_first = np.inf if sound[0] else 0.0
+    explained: _Values = np.maximum(np.maximum(rate, before), 0.0)
+    return explained + np.maximum(np.concatenate(([at_first], recoil)), 0.0)
 
 
 def _jumps(recording: Recording, name: str, before: _Values, fastest: float) -> NDArray[np.bool_]:
