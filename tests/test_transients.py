@@ -75,7 +75,8 @@ def test_the_same_tendon_that_stays_on_its_wrap_is_no_finding():
     model, data = slipping()
     with mjhill.installed():
         run = mjhill.record(model, data, duration=0.1, excitation={"puller": 0.5})
-    assert run["puller.force"].max() > 100
+    assert run["puller.force"].max() > 25
+    assert np.ptp(run["puller.length"]) > 0.01
     assert mjhill.transients(run) == ()
 
 
