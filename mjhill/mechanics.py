@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mjhill.layout import SCALAR_JOINTS, has_passive, joint_names, muscle_ids, read_passive
 from mjhill.parameters import Muscle
-from mjhill.readings import passive_energy, series_energy, series_stiffness, tension
+from mjhill.readings import passive_energy, series_energy, tension_and_stiffness
 from mjhill.samples import Samples, has_other_springs
 
 _Values = NDArray[np.float64]
@@ -107,7 +107,8 @@ def muscle_mechanics(
         series: Its ``velocity``, ``stretch`` and ``force``.
     """
     stretch, force, velocity = series["stretch"], series["force"], series["velocity"]
-    pull = np.array([tension(muscle, x) for x in stretch.tolist()])
+    pairs = [tension_and_stiffness(muscle, x) for x in stretch.tolist()]
+    pull, stiffness = np.array(pairs).T.copy()
     if np.abs(pull - force).max() > _NOTICED * muscle.max_isometric_force:
         yield "tension", "force", pull
     else:
@@ -117,7 +118,6 @@ def muscle_mechanics(
     yield "length", "length", length
     yield "length_rate", "rate", rates
     yield "contractile_length", "length", -shortened
-    stiffness = np.array([series_stiffness(muscle, x) for x in stretch.tolist()])
     yield "series_stiffness", "stiffness", stiffness
     yield "series_energy", "energy", energy
     contractile, whole = path.work(pull, shortened), path.work(force, -length)

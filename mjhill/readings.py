@@ -20,18 +20,20 @@ _Values = NDArray[np.float64]
 
 def tension(muscle: Muscle, stretch: float) -> float:
     """Force of the muscle [N·m or N] at a stretch of its series element; never negative."""
-    force, _ = series_force(
-        stretch, muscle.series_stretch, muscle.series_shape, muscle.series_limit
-    )
-    return muscle.max_isometric_force * force
+    return tension_and_stiffness(muscle, stretch)[0]
 
 
 def series_stiffness(muscle: Muscle, stretch: float) -> float:
     """Slope of the muscle's force over the stretch of its series element [N·m/rad or N/m]."""
-    _, stiffness = series_force(
+    return tension_and_stiffness(muscle, stretch)[1]
+
+
+def tension_and_stiffness(muscle: Muscle, stretch: float) -> tuple[float, float]:
+    """``tension`` and ``series_stiffness`` at a stretch, which come together."""
+    force, stiffness = series_force(
         stretch, muscle.series_stretch, muscle.series_shape, muscle.series_limit
     )
-    return muscle.max_isometric_force * stiffness
+    return muscle.max_isometric_force * force, muscle.max_isometric_force * stiffness
 
 
 def series_energy(muscle: Muscle, stretch: _Values) -> _Values:

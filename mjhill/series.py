@@ -14,8 +14,7 @@ from mjhill.layout import (
     STRETCH_PARAMETERS,
     Address,
     actuator_names,
-    address,
-    is_muscle,
+    addresses,
     joint_id,
     joint_names,
     read_muscles,
@@ -64,16 +63,16 @@ def _all_series(model: mujoco.MjModel, samples: Samples, loads: list[str], every
         joint = joint_id(model, name)
         applied = samples.column("qfrc_applied", int(model.jnt_dofadr[joint]))
         yield f"{name}.applied", _EFFORT[int(model.jnt_type[joint])], applied
-    muscles = read_muscles(model)
+    muscles, places = read_muscles(model), dict(addresses(model))
     arms = _arms(model, samples)
     for actuator, name in enumerate(actuator_names(model)):
-        if is_muscle(model, actuator):
-            found = _muscle_series(model, samples, address(model, name), muscles[name], path)
+        if name in muscles:
+            found = _muscle_series(model, samples, places[name], muscles[name], path)
         else:
             found = _other_series(model, samples, actuator)
         for quantity, unit, values in found:
             yield f"{name}.{quantity}", unit, values
-        if is_muscle(model, actuator):
+        if name in muscles:
             yield from arms.get(actuator, [])
     for name, values in model_mechanics(model, samples, path, every):
         yield f"model.{name}", "J", values
