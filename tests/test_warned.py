@@ -23,10 +23,5 @@ def test_warnings_are_shown_as_before_afterwards():
 
 
 def test_warnings_that_are_errors_stay_errors():
-    with (
-        warnings.catch_warnings(),
-        pytest.raises(RuntimeWarning, match="as asked"),
-        one_line_warnings(),
-    ):
-        warnings.simplefilter("error")
-        warnings.warn("as asked", RuntimeWarning, stacklevel=1)
+    with one_line_warnings(), pytest.raises(RuntimeWarning, match="as asked"):
+        warnings.warn("as asked", RuntimeWarning, stacklevel=1)  # errors, as in all tests
