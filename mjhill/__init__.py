@@ -2,6 +2,8 @@
 
 from mjhill import reference as reference
 from mjhill.checks import check_model as check_model
+from mjhill.energy import Energy as Energy
+from mjhill.energy import energy as energy
 from mjhill.equilibrium import at_home as at_home
 from mjhill.equilibrium import equilibrate as equilibrate
 from mjhill.equivalent import anatomical_muscle as anatomical_muscle
@@ -35,5 +37,7 @@ from mjhill.signals import step as step
 from mjhill.spec import add_muscle as add_muscle
 from mjhill.spec import add_passive as add_passive
 from mjhill.tendons import check_tendons as check_tendons
+from mjhill.transients import Transient as Transient
+from mjhill.transients import transients as transients
 
 __version__ = "0.1.0"
