@@ -24,8 +24,10 @@ from mjhill.parameters import Muscle as Muscle
 from mjhill.parameters import Passive as Passive
 from mjhill.recording import Recording as Recording
 from mjhill.rendering import View as View
+from mjhill.rendering import draw_muscles as draw_muscles
 from mjhill.rendering import render as render
 from mjhill.rendering import snapshot as snapshot
+from mjhill.rendering import view as view
 from mjhill.run import record as record
 from mjhill.signals import Signal as Signal
 from mjhill.signals import constant as constant

@@ -12,6 +12,7 @@ import click
 from mjhill.cli.identify import identify
 from mjhill.cli.printing import json_option, print_paths, print_table, progress_bar, shown
 from mjhill.cli.reproduce import reproduce
+from mjhill.cli.view import view
 
 _OUT = Path("out")
 _SUFFIXES = {"recording": (".csv", ".npz"), "plot": (".png",), "video": (".mp4", ".gif")}
@@ -45,6 +46,7 @@ def main() -> None:
 
 main.add_command(identify)
 main.add_command(reproduce)
+main.add_command(view)
 
 
 def _inputs_option(function: Any) -> Any:
