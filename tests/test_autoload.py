@@ -4,6 +4,7 @@ import sys
 import textwrap
 
 import pytest
+from screen import open_screen
 
 import mjhill
 
@@ -111,6 +112,26 @@ def test_rollout_and_batch_on_threads_have_the_muscle(elbow):
     print(set(states[:, -1, 1].tolist()) == set(batch.qpos[:, 0].tolist()), states[0, -1, 1] != 0)
     """
     assert python(code) == ("True True", "")
+
+
+def test_the_passive_viewer_has_the_muscle(elbow, expected):
+    code = f"""
+    import mujoco, mujoco.viewer, threading
+    m = mujoco.MjModel.from_xml_path({elbow!r})
+    d = mujoco.MjData(m)
+    with mujoco.viewer.launch_passive(m, d) as viewer:
+        d.ctrl[0] = 0.5
+        viewer.sync()
+        for _ in range(200):
+            mujoco.mj_step(m, d)
+            viewer.sync()
+    print(d.qpos[0].hex(), d.act[2].hex())
+    # a process that ends before its window is closed may crash, without mjhill too
+    [t.join(60) for t in threading.enumerate() if t is not threading.main_thread()]
+    """
+    with open_screen() as screen:
+        display = screen.environment["DISPLAY"]
+        assert python(code, DISPLAY=display) == (expected, "")
 
 
 def test_spawned_workers_give_the_result_of_one_process_bit_for_bit(tmp_path):

@@ -358,9 +358,9 @@ with mujoco.Renderer(m, 240, 320) as renderer:
         print((image[..., 0] - image[..., 1:].max(axis=-1) > 120).sum())
 """
     result = run_python(program, MUJOCO_GL="egl")
+    assert result.returncode == 0, result.stderr
     rest, active = map(int, result.stdout.split())
-    assert rest == 0, result.stderr
-    assert active > 100
+    assert active > rest + 100  # the plain tendons are a little red
 
 
 def test_a_native_muscle_shows_its_present_activation_and_force():

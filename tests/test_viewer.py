@@ -3,6 +3,8 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
+from contextlib import contextmanager
 
 import mujoco
 import pytest
@@ -51,12 +53,27 @@ def command(*arguments, **environment):
     )  # fmt: skip
 
 
+@contextmanager
+def on(screen, *arguments):
+    """A process of Python's on a virtual screen, killed at the end or after two minutes."""
+    with subprocess.Popen(
+        [sys.executable, *arguments],
+        env=screen.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        timer = threading.Timer(120, process.kill)
+        timer.start()
+        try:
+            yield process
+        finally:
+            timer.cancel()
+            process.kill()
+
+
 def test_arrows_step_to_and_fro_while_paused(elbow):
     player, data = paused(elbow)
     data.ctrl[0] = 1.0
     pressed(player, RIGHT, RIGHT, RIGHT)
     assert data.time == pytest.approx(3 * elbow.opt.timestep)
-    after_two = None
     pressed(player, LEFT)
     after_two = data.qpos[0], data.act.tolist()
     assert data.time == pytest.approx(2 * elbow.opt.timestep)
@@ -147,44 +164,46 @@ def test_without_a_display_the_command_says_so_in_a_line(display, reason):
 
 def test_the_window_shows_activation_and_obeys_keys(screen):
     program = """
-    import mjhill
+    import threading, time, mjhill
     model = mjhill.load("elbow")
-    for level in (0.0, 1.0):
-        data = mjhill.at_home(model)
-        data.ctrl[0] = level
-        mjhill.equilibrate(model, data)
-        mjhill.view(model, data, paused=True)
-        print(round(data.time / model.opt.timestep), mjhill.installed_backend(), flush=True)
-    print(set(model.tendon_group.tolist()))
+    data = mjhill.at_home(model)
+
+    def watch():
+        last = 0
+        while True:
+            step = round(data.time / model.opt.timestep)
+            if step != last:
+                print(step, flush=True)
+            last = step
+            time.sleep(0.01)
+
+    threading.Thread(target=watch, daemon=True).start()
+    mjhill.view(model, data, paused=True)
+    print("closed", mjhill.installed_backend(), flush=True)
+    data = mjhill.at_home(model)
+    data.ctrl[0] = 1.0
+    mjhill.equilibrate(model, data)
+    mjhill.view(model, data, paused=True)
+    print("closed", set(model.tendon_group.tolist()))
     """
-    with subprocess.Popen(
-        [sys.executable, "-c", textwrap.dedent(program)],
-        env=screen.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
-        try:
-            wait_for(lambda: screen.picture().std() > 30)
-            assert red(screen.picture()) < 20
-            for key in ("Right", "Right", "Right", "Left", "ctrl+q"):
-                screen.press(key)
-            assert process.stdout.readline() == "2 None\n"
-            wait_for(lambda: red(screen.picture()) > 500)
-            screen.press("ctrl+q")
-            assert process.stdout.read() == "0 None\n{0}\n"
-            assert process.wait(30) == 0
-            assert process.stderr.read() == ""
-        finally:
-            process.kill()
+    with on(screen, "-c", textwrap.dedent(program)) as process:
+        wait_for(lambda: screen.picture().std() > 30)
+        assert red(screen.picture()) < 20
+        for key, step in (("Right", 1), ("Right", 2), ("Left", 1)):
+            screen.press(key)
+            assert process.stdout.readline() == f"{step}\n"
+        screen.press("ctrl+q")
+        assert process.stdout.readline() == "closed None\n"
+        wait_for(lambda: red(screen.picture()) > 500)
+        screen.press("ctrl+q")
+        assert process.stdout.read().endswith("closed {0}\n")
+        assert process.wait() == 0
+        assert process.stderr.read() == ""
 
 
 def test_the_command_runs_until_it_is_interrupted(screen):
-    with subprocess.Popen(
-        [sys.executable, "-m", "mjhill", "view", "elbow"],
-        env=screen.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
-        try:
-            wait_for(lambda: screen.picture().std() > 30)
-            process.send_signal(signal.SIGINT)
-            assert process.wait(30) == 0
-            assert (process.stdout.read(), process.stderr.read()) == ("", "")
-        finally:
-            process.kill()
+    with on(screen, "-m", "mjhill", "view", "elbow") as process:
+        wait_for(lambda: screen.picture().std() > 30)
+        process.send_signal(signal.SIGINT)
+        assert process.wait() == 0
+        assert (process.stdout.read(), process.stderr.read()) == ("", "")

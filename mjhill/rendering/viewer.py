@@ -220,7 +220,7 @@ def _window(player: Player) -> Iterator[Any]:
     finally:
         window.close()
         for thread in threads:
-            thread.join(5.0)  # or the process could end while the window is being closed
+            thread.join(5.0)  # MuJoCo crashes where the process ends before
 
 
 def _aim(camera: Any, model: mujoco.MjModel, data: mujoco.MjData) -> None:
