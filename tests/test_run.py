@@ -129,7 +129,7 @@ def test_a_forcerange_shows_in_force_and_tension_says_what_the_muscle_would_give
 def test_a_muscle_of_a_disabled_group_is_recorded_with_no_force(elbow):
     model = limited(elbow, group=3)
     model.opt.disableactuator = 1 << 3
-    with mjhill.installed():
+    with mjhill.installed(), pytest.warns(RuntimeWarning, match="its group 3 is disabled"):
         run = mjhill.record(model, rest(model, elbow_flexor=1.0), duration=0.05)
     np.testing.assert_array_equal(run["elbow_flexor.force"], 0.0)
     assert not np.signbit(run["elbow_flexor.force"]).any()
@@ -341,9 +341,14 @@ def test_an_input_of_the_wrong_type_says_what_to_pass(pair):
 
 
 def test_a_run_in_which_mujoco_warned_is_a_failed_run(pair):
+    with mjhill.installed(), pytest.raises(RuntimeError, match="MuJoCo warned 'badqacc'"):
+        mjhill.record(pair, rest(pair), duration=0.1, torque={"elbow": 1e12})
+
+
+def test_a_start_that_no_muscle_can_be_in_is_refused(pair):
     data = rest(pair)
     data.qvel[0] = 1e12
-    with mjhill.installed(), pytest.raises(RuntimeError, match="MuJoCo warned 'badqvel'"):
+    with mjhill.installed(), pytest.raises(ValueError, match="'elbow_extensor': it is lengthened"):
         mjhill.record(pair, data, duration=0.1)
 
 

@@ -89,8 +89,9 @@ def test_findings_survive_saving(tmp_path):
 
 
 def test_states_of_another_pose_are_a_finding_that_names_equilibrate(pair):
+    pair.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4  # others take it up in the first step
     data = rest(pair)
-    data.qpos[0] -= 0.7
+    data.qpos[0] -= 0.35  # the series element carries 1.6 F_max
     with mjhill.installed(), pytest.warns(RuntimeWarning, match="call mjhill.equilibrate"):
         run = mjhill.record(pair, data, duration=0.05)
     found = {(each.muscle, each.kind) for each in mjhill.transients(run)}
