@@ -163,11 +163,6 @@ def _reason(kind: str, worst: int, jumped: NDArray[np.bool_]) -> tuple[str, str]
             "its length jumps there, as where a tendon slips off the geom that it wraps",
             "give the geom a sidesite, or lead the tendon so that it cannot slip off",
         )
-    if worst == 0:
-        return (
-            "the run began with states that do not belong to its pose",
-            "call mjhill.equilibrate(model, data) before it",
-        )
     return (
         "the timestep is too long for this movement, or the state was set during the run",
         "lower the timestep; mjhill.check_model says which would do",

@@ -88,14 +88,11 @@ def test_findings_survive_saving(tmp_path):
     assert mjhill.transients(loaded) == mjhill.transients(run) != ()
 
 
-def test_states_of_another_pose_are_a_finding_that_names_equilibrate(pair):
-    pair.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4  # others take it up in the first step
+def test_states_of_another_pose_are_refused_before_the_run(pair):
     data = rest(pair)
-    data.qpos[0] -= 0.35  # the series element carries 1.6 F_max
-    with mjhill.installed(), pytest.warns(RuntimeWarning, match="call mjhill.equilibrate"):
-        run = mjhill.record(pair, data, duration=0.05)
-    found = {(each.muscle, each.kind) for each in mjhill.transients(run)}
-    assert ("elbow_flexor", "force") in found
+    data.qpos[0] -= 0.7
+    with mjhill.installed(), pytest.raises(ValueError, match=r"to 39.7 F_max.*mjhill.equilibrate"):
+        mjhill.record(pair, data, duration=0.05)
 
 
 def test_a_muscle_that_pushes_is_a_finding(elbow):
