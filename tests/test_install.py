@@ -2,8 +2,6 @@ import ctypes
 import os
 import subprocess
 import sys
-import threading
-import time
 
 import mujoco
 import mujoco.batch
@@ -251,33 +249,3 @@ def test_a_read_only_home_still_compiles(tmp_path):
         [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False
     )
     assert run.stdout.strip() == "True", run.stderr
-
-
-def test_threads_with_a_back_end_each_step_side_by_side():
-    # what the interpreter may do between any two instructions, it does more often
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(1e-5)
-    models = {backend: mjhill.load("elbow") for backend in ("compiled", "python")}
-    ends, errors = {backend: set() for backend in models}, []
-    end = time.monotonic() + 1.0
-
-    def work(backend):
-        try:
-            while time.monotonic() < end:
-                data = mujoco.MjData(models[backend])
-                data.ctrl[:] = [0.5, 0.2]
-                with mjhill.installed(backend):
-                    mujoco.mj_step(models[backend], data, nstep=20)
-                ends[backend].add(round(float(data.qpos[0]), 12))
-        except Exception as error:  # would end in a thread unseen
-            errors.append(error)
-
-    threads = [threading.Thread(target=work, args=(backend,)) for backend in models]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    sys.setswitchinterval(interval)
-    assert errors == []
-    # the same movement, whichever back-end took which step
-    assert len(ends["compiled"] | ends["python"]) == 1
