@@ -11,10 +11,15 @@ be half imported when MuJoCo calls.
 
 from __future__ import annotations
 
+import _thread
 import ctypes
 import math
 import os
+import signal
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import mujoco
@@ -58,6 +63,7 @@ class _Loaded:
     def __init__(self) -> None:
         self.functions: dict[str, Any] | None = None
         self.tried = False
+        self.imported = False
 
 
 _loaded = _Loaded()
@@ -72,6 +78,7 @@ def _act_bias(m: int, d: int, actuator: int) -> float:
 
 
 def _actuator(name: str, m: int, d: int, actuator: int) -> float:
+    _import()
     if _is_muscle(m, actuator):
         functions = _functions()
         # what cannot be computed must not look like a relaxed muscle
@@ -81,6 +88,7 @@ def _actuator(name: str, m: int, d: int, actuator: int) -> float:
 
 
 def _passive(m: int, d: int) -> None:
+    _import()
     from mjhill.layout import NUSER_JNT
 
     if _nuser_jnt(m) >= NUSER_JNT:
@@ -92,6 +100,15 @@ def _passive(m: int, d: int) -> None:
     passed_on = PROCESS.served["passive"].pointer
     if passed_on:
         TYPES["passive"](passed_on)(m, d)
+
+
+def _import() -> None:
+    """Import what the stubs use, which takes longer where nothing of mjhill is imported yet."""
+    if not _loaded.imported:
+        with _interrupts_waiting():
+            import mjhill.callbacks.structs
+            import mjhill.layout  # noqa: F401
+        _loaded.imported = True
 
 
 def _is_muscle(m: int, actuator: int) -> bool:
@@ -115,13 +132,31 @@ def _functions() -> dict[str, Any] | None:
         if not _loaded.tried:
             _loaded.tried = True  # before, because loading makes a small model, which asks again
             try:
-                _load()
+                with _interrupts_waiting():
+                    _load()
             except Exception as error:
                 print(
                     f"mjhill: the muscle cannot run, its forces are not numbers: {error}",
                     file=sys.stderr,
                 )
         return _loaded.functions
+
+
+@contextmanager
+def _interrupts_waiting() -> Iterator[None]:
+    """Keep Ctrl-C waiting: raised in a callback from C it would be lost, and the load with it."""
+    waiting: list[int] = []
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+        yield
+        return
+    signal.signal(signal.SIGINT, lambda *_: waiting.append(1))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if waiting:  # soon, when the callback has returned
+            threading.Timer(0.02, _thread.interrupt_main).start()
 
 
 def _load() -> None:
