@@ -63,7 +63,8 @@ class _Loaded:
     def __init__(self) -> None:
         self.functions: dict[str, Any] | None = None
         self.tried = False
-        self.imported = False
+        self.structs: bool | None = None
+        self.checking = False
 
 
 _loaded = _Loaded()
@@ -78,37 +79,56 @@ def _act_bias(m: int, d: int, actuator: int) -> float:
 
 
 def _actuator(name: str, m: int, d: int, actuator: int) -> float:
-    _import()
-    if _is_muscle(m, actuator):
+    known = _ready()
+    if known and _is_muscle(m, actuator):
         functions = _functions()
         # what cannot be computed must not look like a relaxed muscle
         return float(functions[name](m, d, actuator)) if functions else math.nan
     passed_on = PROCESS.served[name].pointer
-    return float(TYPES[name](passed_on)(m, d, actuator)) if passed_on else 0.0
+    if passed_on:
+        return float(TYPES[name](passed_on)(m, d, actuator))
+    return 0.0 if known else math.nan
 
 
 def _passive(m: int, d: int) -> None:
-    _import()
-    from mjhill.layout import NUSER_JNT
+    if _ready():
+        from mjhill.layout import NUSER_JNT
 
-    if _nuser_jnt(m) >= NUSER_JNT:
-        functions = _functions()
-        if functions:
-            functions["passive"](m, d)
-        return
-    _put_guard(NUSER_JNT)
+        if _nuser_jnt(m) >= NUSER_JNT:
+            functions = _functions()
+            if functions:
+                functions["passive"](m, d)
+            return
+        _put_guard(NUSER_JNT)
     passed_on = PROCESS.served["passive"].pointer
     if passed_on:
         TYPES["passive"](passed_on)(m, d)
 
 
-def _import() -> None:
-    """Import what the stubs use, which takes longer where nothing of mjhill is imported yet."""
-    if not _loaded.imported:
-        with _interrupts_waiting():
-            import mjhill.callbacks.structs
-            import mjhill.layout  # noqa: F401
-        _loaded.imported = True
+def _ready() -> bool:
+    """Whether MuJoCo's structs are where the stubs look; the first call checks that."""
+    if _loaded.structs is None:
+        with PROCESS.lock:
+            if _loaded.checking:
+                return False  # by the small model of the check itself
+            _loaded.checking = True
+            try:
+                with _interrupts_waiting():
+                    import mjhill.layout  # noqa: F401
+                    from mjhill.callbacks.structs import verify_fields
+
+                    verify_fields()
+                _loaded.structs = True
+            except Exception as error:
+                _loaded.structs = False
+                _complain(error)
+            finally:
+                _loaded.checking = False
+    return _loaded.structs
+
+
+def _complain(error: Exception) -> None:
+    print(f"mjhill: the muscle cannot run, its forces are not numbers: {error}", file=sys.stderr)
 
 
 def _is_muscle(m: int, actuator: int) -> bool:
@@ -135,10 +155,7 @@ def _functions() -> dict[str, Any] | None:
                 with _interrupts_waiting():
                     _load()
             except Exception as error:
-                print(
-                    f"mjhill: the muscle cannot run, its forces are not numbers: {error}",
-                    file=sys.stderr,
-                )
+                _complain(error)
         return _loaded.functions
 
 

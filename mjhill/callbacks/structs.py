@@ -62,8 +62,8 @@ def _mismatch(what: str) -> str:
         f"MuJoCo {mujoco.__version__} {what}, so the compiled muscle of mjhill {version('mjhill')} "
         f"cannot run with it; it was made for MuJoCo {_MADE_FOR}. After an upgrade of mujoco: "
         "'pip install --upgrade mjhill', or go back with "
-        f"'pip install mujoco=={_MADE_FOR}'. mjhill.install(\"python\") runs the muscle "
-        "meanwhile, many times slower"
+        f"'pip install mujoco=={_MADE_FOR}'. Meanwhile it runs, many times slower, with "
+        'backend="python"'
     )
 
 
