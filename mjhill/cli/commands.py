@@ -214,8 +214,8 @@ def bench(
 ) -> None:
     """Measure accuracy, cost, threads, start and video, or those of NAMES.
 
-    All of them take about 7 minutes on two cores. Each table says what was wanted (goal) and
-    whether it was met.
+    All of them take about 5 minutes on two cores, most of it video, which a graphics card makes
+    shorter. Each table says what was wanted (goal) and whether it was met.
 
     With the name sweep: random systems against the reference solver, about 2 minutes.
     """

@@ -76,7 +76,11 @@ def print_table(rows: list[dict[str, Any]], as_json: bool, title: str, across: b
     for row in rows:
         table.add_row(*(Text(_encodable(shown(value))) for value in row.values()))
     # a pipe has no width of its own; rich would cut the sources at 80 columns
-    Console(width=None if sys.stdout.isatty() else 160).print(table)
+    console = Console(width=None if sys.stdout.isatty() else 160)
+    with console.capture() as printed:  # rich would end the process itself where nobody reads
+        console.print(table)
+    sys.stdout.write(printed.get())
+    sys.stdout.flush()
 
 
 def print_json(value: Any) -> None:
