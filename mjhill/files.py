@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import errno
 import fcntl
 import itertools
@@ -16,6 +17,7 @@ from pathlib import Path
 from mjhill import interrupts
 
 _NUMBERS = itertools.count()
+_own: dict[Path, int] = {}  # partial files and folders, and the process that made each
 _PARTIAL = re.compile(r"\..*\.mjhill\.\d+-\d+\.partial(\.[^.]*)?", re.DOTALL)
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _LONGEST = 100  # of what is kept of a file's name in that of its partial file [byte]
@@ -46,8 +48,6 @@ def replacing(path: str | Path) -> Iterator[Path]:
             if error.errno in _FULL:
                 raise _full(path, error) from error
             raise
-        finally:
-            partial.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -59,10 +59,7 @@ def partial_folder(folder: Path, name: str) -> Iterator[Path]:
     """
     sweep(folder)
     with _locked(folder, name, "", _make_folder) as partial:
-        try:
-            yield partial
-        finally:
-            shutil.rmtree(partial, ignore_errors=True)
+        yield partial
 
 
 def check_writable(path: Path) -> None:
@@ -99,27 +96,47 @@ def _remove_if_dead(path: Path) -> None:
         file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # fails while its process lives
-            shutil.rmtree(path) if folder else path.unlink()
+            _remove(path)
         finally:
             os.close(file)
 
 
 @contextmanager
 def _locked(folder: Path, stem: str, suffix: str, make: Callable[[Path], int]) -> Iterator[Path]:
-    """Make a partial file or folder and hold a lock on it, which ends with the process."""
+    """Make a partial file or folder, hold a lock on it as long as this process lives, remove it."""
     short = os.fsdecode(os.fsencode(stem)[:_LONGEST])
     while True:
         name = f".{short}.mjhill.{os.getpid()}-{next(_NUMBERS)}.partial{suffix}"
         path = folder / name
-        file = make(path)
+        if path.exists():
+            continue  # of another machine, in a folder that both share
+        _own[path] = os.getpid()  # before it is there: an interrupt may come at any point
+        file = -1
         try:
+            file = make(path)
             with suppress(OSError):  # a file system without locks
                 fcntl.flock(file, fcntl.LOCK_EX)
             if path.exists():  # else a sweep was faster than the lock
                 yield path
                 return
         finally:
-            os.close(file)
+            _remove(path)
+            if file >= 0:
+                os.close(file)
+            del _own[path]
+
+
+def _remove(path: Path) -> None:
+    with suppress(OSError):
+        shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+
+
+@atexit.register
+def _remove_own() -> None:
+    """Remove what an interrupt at an unlucky point has left."""
+    for path, process in list(_own.items()):
+        if process == os.getpid():
+            _remove(path)
 
 
 def _make_file(path: Path) -> int:

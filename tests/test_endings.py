@@ -72,14 +72,14 @@ def assert_whole(folder):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "begun"),
+    ("arguments", "begun", "number", "code"),
     [
-        (("video", "elbow"), "out/.*.mp4"),
-        (("run", "elbow", "-d", "2000"), "out"),
-        (("identify", "elbow"), "out/identify"),
+        (("video", "elbow"), "out/.*.mp4", signal.SIGINT, 130),
+        (("video", "elbow"), "out/.*.mp4", signal.SIGTERM, 143),
+        (("run", "elbow", "-d", "2000"), "out", signal.SIGTERM, 143),
+        (("identify", "elbow"), "out/identify", signal.SIGINT, 130),
     ],
 )
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interrupted_command_leaves_no_file(arguments, begun, number, code):
     command = Command(*arguments)
     command.wait_for(begun)
