@@ -54,6 +54,9 @@ def _told() -> Iterator[None]:
     except (click.ClickException, click.exceptions.Exit, click.exceptions.Abort):
         raise  # click's own endings; the last two are RuntimeErrors
     except KeyboardInterrupt:
+        # Python notes an interrupt of code made from text, such as a dataclass, and would kill
+        # itself at its exit; other such code takes the note away
+        exec("")
         _end("interrupted", code=128 + signal.SIGINT)
     except BrokenPipeError:
         _leave_stdout()
