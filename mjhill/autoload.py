@@ -161,19 +161,26 @@ def _functions() -> dict[str, Any] | None:
 
 @contextmanager
 def _interrupts_waiting() -> Iterator[None]:
-    """Keep Ctrl-C waiting: raised in a callback from C it would be lost, and the load with it."""
-    waiting: list[int] = []
-    handler = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+    """Keep Ctrl-C waiting: raised in a callback from C it would be lost, and the load with it.
+
+    The same for SIGTERM where the program turns it into an exception.
+    """
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
-    signal.signal(signal.SIGINT, lambda *_: waiting.append(1))
+    waiting: list[int] = []
+    before = {
+        number: signal.signal(number, lambda arrived, _: waiting.append(arrived))
+        for number in (signal.SIGINT, signal.SIGTERM)
+        if callable(signal.getsignal(number))
+    }
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, handler)
-        if waiting:  # soon, when the callback has returned
-            threading.Timer(0.02, _thread.interrupt_main).start()
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for arrived in waiting[:1]:  # soon, when the callback has returned
+            threading.Timer(0.02, _thread.interrupt_main, (arrived,)).start()
 
 
 def _load() -> None:

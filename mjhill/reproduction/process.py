@@ -13,6 +13,7 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from types import FrameType
@@ -95,6 +96,7 @@ def uninterrupted() -> Iterator[None]:
     Ctrl-C reaches every process of a terminal, and what is to end is for one of them to say.
     """
     waiting: list[int] = []
+    resource_tracker.ensure_running()  # its start, by the first process, would lift the mask again
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # those started inherit it
     # a blocked signal goes to another thread, such as one of a numerical library, and would be
     # raised here all the same
@@ -133,6 +135,7 @@ def _work(
     part: Part, workplace: Path, fingerprint: str, video: bool, connection: Connection
 ) -> None:
     signal.signal(signal.SIGTERM, _leave)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent to answer
     parent = multiprocessing.parent_process()
     assert parent is not None
     threading.Thread(target=_end_with, args=(parent, workplace), daemon=True).start()
@@ -145,14 +148,19 @@ def _work(
             connection.send(float(share))  # fails where the other side is gone, and so ends this
             last = now
 
+    end: Success | Failure
     try:
-        problem = make(part, workplace, fingerprint=fingerprint, video=video, progress=progress)
+        try:
+            end = Success(
+                make(part, workplace, fingerprint=fingerprint, video=video, progress=progress)
+            )
+        except BrokenPipeError:
+            raise
+        except Exception as error:
+            end = Failure(f"{type(error).__name__}: {error}", traceback.format_exc())
+        connection.send(end)
     except BrokenPipeError:
-        sys.exit(1)
-    except Exception as error:
-        connection.send(Failure(f"{type(error).__name__}: {error}", traceback.format_exc()))
-    else:
-        connection.send(Success(problem))
+        sys.exit(1)  # nobody listens any more
     finally:
         if not parent.is_alive():
             shutil.rmtree(workplace, ignore_errors=True)
