@@ -99,7 +99,8 @@ def _passive(m: int, d: int) -> None:
             if functions:
                 functions["passive"](m, d)
             return
-        _put_guard(NUSER_JNT)
+        with _interrupts_waiting():
+            _put_guard(NUSER_JNT)
     passed_on = PROCESS.served["passive"].pointer
     if passed_on:
         TYPES["passive"](passed_on)(m, d)
