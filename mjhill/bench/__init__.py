@@ -11,6 +11,8 @@ from importlib.metadata import version
 from mjhill.bench.result import Result
 
 NAMES = ("accuracy", "cost", "threads", "start", "video")  # and sweep, which takes longer
+# on two cores without a graphics card
+SECONDS = {"accuracy": 10, "cost": 20, "threads": 10, "start": 30, "video": 230}
 
 
 def run(
@@ -21,16 +23,31 @@ def run(
     Raises:
         ValueError: There is no such benchmark; the message lists those there are.
     """
-    for name in names:
-        if name not in NAMES:
-            raise ValueError(f"unknown benchmark {name!r}; there are: {', '.join(NAMES)}")
-    chosen = names or NAMES
+    chosen = check_names(names)
     results = {}
     for index, name in enumerate(chosen):
         results[name] = import_module(f"mjhill.bench.{name}").measure()
         if progress is not None:
             progress((index + 1) / len(chosen))
     return results
+
+
+def check_names(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The benchmarks that are asked for, all without any.
+
+    Raises:
+        ValueError: There is no such benchmark; the message lists those there are.
+    """
+    for name in names:
+        if name not in NAMES:
+            raise ValueError(f"unknown benchmark {name!r}; there are: {', '.join(NAMES)}")
+    return names or NAMES
+
+
+def length(names: tuple[str, ...]) -> str:
+    """How long benchmarks take on two cores, in words."""
+    seconds = sum(SECONDS[name] for name in names)
+    return f"about {seconds} s" if seconds < 90 else f"about {round(seconds / 60)} minutes"
 
 
 def versions() -> str:
