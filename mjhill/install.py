@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from threading import get_ident
 from typing import Any, Literal, get_args
 
 import mujoco
@@ -39,6 +40,7 @@ class _Installation:
     before: dict[str, Slot]
     ours: dict[str, Slot]
     served: dict[str, Slot]
+    thread: int
 
 
 def install(backend: Backend = "compiled") -> None:
@@ -76,7 +78,7 @@ def _install(backend: Backend) -> _Installation:
             restore(before)
             raise
         ours = {name: read(name) for name in NAMES}
-        _stack.append(_Installation(backend, before, ours, served))
+        _stack.append(_Installation(backend, before, ours, served, get_ident()))
         return _stack[-1]
 
 
@@ -175,12 +177,16 @@ def _put_compiled(served: dict[str, Slot]) -> None:
     for index, name in enumerate(NAMES):
         compiled.chain[index] = served[name].pointer
         function = TYPES[name](getattr(compiled, name))
-        if read(name).is_python:
+        if served[name].is_python or (_of_other_threads() and read(name).is_python):
             # the bindings must go on holding the Python function: we pass on to it, or another
             # thread is about to call it
             global_pointer(name).value = getattr(compiled, name)
         else:
             getattr(mujoco, f"set_mjcb_{name}")(function)
+
+
+def _of_other_threads() -> bool:
+    return any(installation.thread != get_ident() for installation in _stack)
 
 
 def _put_python(served: dict[str, Slot]) -> None:
@@ -225,7 +231,7 @@ def _callable(name: str, slot: Slot) -> Callable[..., Any] | None:
 def _put_back(slots: dict[str, Slot]) -> None:
     """What callbacks held before; a Python function that a thread may be about to call stays."""
     for name, slot in slots.items():
-        if _stack and not slot.is_python and read(name).is_python:
+        if _of_other_threads() and not slot.is_python and read(name).is_python:
             global_pointer(name).value = slot.pointer
         else:
             restore({name: slot})
