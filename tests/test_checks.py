@@ -53,7 +53,7 @@ def test_a_parameter_out_of_bounds_in_the_model_is_named_with_its_muscle(pair):
     pair.actuator_dynprm[1, 2] = -0.01
     with pytest.raises(
         ValueError,
-        match=r"muscle 'elbow_extensor': activation_tau must be in \(0, 1\] s, got -0.01",
+        match=r"muscle 'elbow_extensor': activation_tau must be in \[1e-06, 1\] s, got -0.01",
     ):
         mjhill.check_model(pair)
 
