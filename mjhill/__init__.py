@@ -34,5 +34,6 @@ from mjhill.signals import sinusoid as sinusoid
 from mjhill.signals import step as step
 from mjhill.spec import add_muscle as add_muscle
 from mjhill.spec import add_passive as add_passive
+from mjhill.tendons import check_tendons as check_tendons
 
 __version__ = "0.1.0"

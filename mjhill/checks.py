@@ -6,7 +6,6 @@ import math
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -19,7 +18,6 @@ from mjhill.layout import (
     SCALAR_JOINTS,
     STATES,
     actuator_names,
-    has_passive,
     joint_names,
     moments,
     muscle_ids,
@@ -28,10 +26,11 @@ from mjhill.layout import (
     read_passive,
 )
 from mjhill.parameters import Muscle, quantities
+from mjhill.stability import Plant
 
-COARSE = 0.2  # natural frequency x timestep (thirty steps a period) from which 5 % may be lost
-PASSIVE_LOAD = 2.0  # passive torque that a movement may meet, in units of the strongest muscle's
-GRAVITY = "mjhill_gravity"  # name of the custom numeric with the gravity that a model is made for
+COARSE = 0.3  # stiffness, in units of what a timestep can hold, from which 5 % may be lost
+# custom numeric with the options that a model is made for: gravity, timestep, integrator
+MADE_FOR = "mjhill_made_for"
 
 _Values = NDArray[np.float64]
 
@@ -87,11 +86,13 @@ def check_model(model: mujoco.MjModel) -> tuple[Finding, ...]:
     if not (math.isfinite(timestep) and timestep > 0):
         raise ValueError(f"timestep must be positive, got {timestep} s; set model.opt.timestep")
     findings = (
-        *_fast_joints(model),
+        *_fast_joints(model, names),
         *_fast_activation(model, muscles, names),
         *_pushing(model, muscles, names),
         *_clipped(model, muscles, names),
-        *_other_gravity(model),
+        *_powerless(model, muscles, names),
+        *_cut_off(model, muscles),
+        *_made_otherwise(model),
     )
     for finding in findings:
         if finding.severe:
@@ -147,7 +148,8 @@ def _word(value: object) -> str:
 
 def _check_bounds(model: mujoco.MjModel, muscles: list[int]) -> None:
     columns = parameter_columns(model, muscles)
-    good = np.isin(columns["electrical_stimulation"], (0.0, 1.0))
+    stimulated = columns["electrical_stimulation"]
+    good = (stimulated == 0) | (stimulated == 1)
     for name, quantity in quantities(Muscle):
         values = columns[name]
         above = values >= quantity.low if quantity.low_allowed else values > quantity.low
@@ -186,37 +188,40 @@ def _check_elasticities(model: mujoco.MjModel) -> None:
         read_passive(model, names[joint])
 
 
-def _fast_joints(model: mujoco.MjModel) -> Iterator[Finding]:
-    """Findings on joints that swing too fast for the timestep."""
+def _fast_joints(model: mujoco.MjModel, names: list[str]) -> Iterator[Finding]:
+    """Findings on joints that muscles make too stiff for the timestep."""
     timestep = float(model.opt.timestep)
-    plant = _Plant.of(model)
-    if plant is None:
+    overloads = [(part, part.overloads(timestep, COARSE)) for part in Plant.parts(model)]
+    overloads = [(part, modes) for part, modes in overloads if modes]
+    if not overloads:
         return
-    modes = [(joint, w) for joint, w in plant.modes() if timestep * w >= COARSE]
-    if not modes:
-        return
-    names = joint_names(model)
-    growing = plant.growing(timestep, model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4)
-    seen = set()
-    for joint, frequency in modes:
-        if joint in seen:
+    joints, seen = joint_names(model), set()
+    enough = min(part.longest(timestep, COARSE) for part, _ in overloads)
+    for mode in sorted((m for _, modes in overloads for m in modes), key=lambda m: -m.load):
+        if mode.joint in seen:
             continue
-        seen.add(joint)
-        severe = joint in growing
+        seen.add(mode.joint)
+        severe = mode.load >= 1
         effect = (
-            "and at this timestep it swings ever wider, so the result will be meaningless"
+            "so it is unstable there: forces change sign from step to step"
             if severe
-            else "so the result may be off by 5 %"
+            else f"and from {COARSE:g} on results may be off by 5 %"
         )
-        enough = COARSE / frequency
+        muscles = ", ".join(repr(names[muscle]) for muscle in mode.muscles)
         yield Finding(
-            f"joint {names[joint]!r} with its muscles at full force",
-            f"natural frequency [rad/s] times timestep is {timestep * frequency:.3g}, past "
-            f"{COARSE:g}, {effect}",
-            f"set model.opt.timestep to {enough:.2g} s or less",
+            f"joint {joints[mode.joint]!r}",
+            f"with its muscles at full force ({muscles}) its stiffness is {mode.load:.2g} of "
+            f"what a timestep of {timestep:g} s can hold, {effect}",
+            f"set model.opt.timestep to {_rounded_down(enough):g} s or less",
             severe,
             enough,
         )
+
+
+def _rounded_down(timestep: float) -> float:
+    """A timestep [s] with two digits, no longer than the given one."""
+    unit = 10.0 ** (math.floor(math.log10(timestep)) - 1)
+    return math.floor(timestep / unit * (1 + 1e-12)) * unit
 
 
 def _fast_activation(
@@ -276,169 +281,91 @@ def _clipped(model: mujoco.MjModel, muscles: list[int], names: list[str]) -> Ite
         )
 
 
-def _other_gravity(model: mujoco.MjModel) -> Iterator[Finding]:
-    """Findings on parts made for another gravity, which the model has taken over from elsewhere."""
+def _powerless(model: mujoco.MjModel, muscles: list[int], names: list[str]) -> Iterator[Finding]:
+    """Findings on muscles whose force MuJoCo leaves out."""
+    if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION):
+        yield Finding(
+            "the model",
+            "actuation is disabled, so no muscle exerts a force",
+            "clear the flag mjDSBL_ACTUATION in model.opt.disableflags",
+            True,
+        )
+    if not model.opt.disableactuator:
+        return
+    for actuator in muscles:
+        group = int(model.actuator_group[actuator])
+        # MuJoCo can disable groups 0 to 30
+        if 0 <= group <= 30 and model.opt.disableactuator >> group & 1:
+            yield Finding(
+                f"muscle {names[actuator]!r}",
+                f"its group {group} is disabled, so it exerts no force",
+                "enable the group in model.opt.disableactuator",
+                True,
+            )
+
+
+def _cut_off(model: mujoco.MjModel, muscles: list[int]) -> Iterator[Finding]:
+    """Findings on joints and tendons that limit the force of all their actuators together."""
+    if not (model.jnt_actfrclimited.any() or model.tendon_actfrclimited.any()):
+        return
+    forces = parameter_columns(model, muscles)["max_isometric_force"]
+    outs, ids = model.actuator_outadr[muscles], model.actuator_trnid[muscles, 0]
+    data = mujoco.MjData(model)
+    mujoco.mj_fwdPosition(model, data)
+    torques = np.abs(moments(model, data)[outs] * forces[:, None]).max(axis=0)
+    names = joint_names(model)
+    for joint in np.flatnonzero(model.jnt_actfrclimited).tolist():
+        strongest = float(torques[model.jnt_dofadr[joint]])
+        yield from _too_weak(f"joint {names[joint]!r}", model.jnt_actfrcrange[joint], strongest)
+    on_tendon = model.actuator_trntype[muscles] == int(mujoco.mjtTrn.mjTRN_TENDON)
+    for tendon in np.unique(ids[on_tendon]).tolist():
+        if model.tendon_actfrclimited[tendon]:
+            rows = on_tendon & (ids == tendon)
+            strongest = float((forces * np.abs(model.actuator_gear[outs, 0]))[rows].max())
+            subject = f"tendon {model.tendon(tendon).name!r}"
+            yield from _too_weak(subject, model.tendon_actfrcrange[tendon], strongest)
+
+
+def _too_weak(subject: str, limits: _Values, strongest: float) -> Iterator[Finding]:
+    low, high = limits.tolist()
+    if min(-low, high) < strongest:
+        yield Finding(
+            subject,
+            f"its actuatorfrcrange, {low:g} to {high:g}, cuts off forces of its muscles (one "
+            f"alone pulls with {strongest:.3g})",
+            "make the range wider, or take it away",
+            True,
+        )
+
+
+def _made_otherwise(model: mujoco.MjModel) -> Iterator[Finding]:
+    """Findings on attached parts, for which the options of the whole model hold now."""
     for index in range(model.nnumeric):
         numeric = model.numeric(index)
-        if numeric.name.endswith(GRAVITY) and (numeric.data != model.opt.gravity).any():
-            made, now = (" ".join(f"{v:g}" for v in g) for g in (numeric.data, model.opt.gravity))
-            part = numeric.name.removesuffix(GRAVITY) or "the model"
+        part = numeric.name.replace(MADE_FOR, "")
+        if MADE_FOR not in numeric.name or len(numeric.data) != 5 or not part:
+            continue
+        x, y, z, timestep, integrator = numeric.data.tolist()
+        made = _options(x, y, z, timestep, integrator)
+        x, y, z = model.opt.gravity.tolist()
+        now = _options(x, y, z, model.opt.timestep, model.opt.integrator)
+        changed = [(old, new) for old, new in zip(made, now, strict=True) if old != new]
+        if changed:
             yield Finding(
-                f"{part!r}" if part != "the model" else part,
-                f"it was made for gravity {made} m/s² and now has {now}, so its limb falls",
-                "set model.opt.gravity, or hold the limb with tonic input",
+                f"attached model {part!r}",
+                f"it was made for {', '.join(old for old, _ in changed)}, and the model it is part "
+                f"of has {', '.join(new for _, new in changed)}"
+                + (", so a limb without tonic input falls" if made[0] != now[0] else ""),
+                "set model.opt if that is not meant",
                 False,
             )
 
 
-def natural_frequencies(model: mujoco.MjModel) -> list[tuple[str, float]]:
-    """Natural frequencies [rad/s] of a model at ``qpos0``, fastest first, and the joint of each.
-
-    All muscles pull at full force, and passive elasticities carry ``PASSIVE_LOAD`` times the
-    torque of the strongest muscle. What equality constraints hold together moves together.
-    """
-    plant, names = _Plant.of(model), joint_names(model)
-    return [(names[joint], w) for joint, w in plant.modes()] if plant else []
-
-
-@dataclass(frozen=True)
-class _Plant:
-    """A model as small movements about ``qpos0`` see it, all muscles at full force.
-
-    Coordinates y are those that equality constraints leave free.
-
-    Attributes:
-        joints: Joint id of each degree of freedom.
-        free: A movement of the model [dof] for each of y, shape (nv, n).
-        mass: Inertia, shape (n, n).
-        viscosity: Shape (n, n).
-        elasticity: Stiffness of the joints, shape (n, n).
-        arms: Change of each muscle's length with y, shape (nmuscle, n).
-        slopes: Stiffness of each series element, shape (nmuscle,).
-        relaxation: Rate [1/s] at which each contractile element takes up a stretch.
-    """
-
-    joints: NDArray[np.int32]
-    free: _Values
-    mass: _Values
-    viscosity: _Values
-    elasticity: _Values
-    arms: _Values
-    slopes: _Values
-    relaxation: _Values
-
-    @staticmethod
-    def of(model: mujoco.MjModel) -> _Plant | None:
-        """The plant of a model; None without muscles."""
-        muscles = muscle_ids(model)
-        if not muscles:
-            return None
-        data = mujoco.MjData(model)
-        mujoco.mj_fwdPosition(model, data)
-        columns = parameter_columns(model, muscles)
-        force, hill = columns["max_isometric_force"], columns["hill_shape"]
-        growth = np.exp(columns["series_shape"])
-        per_force = columns["series_shape"] / columns["series_stretch"] * growth / (growth - 1)
-        arms = moments(model, data)[model.actuator_outadr[muscles]]
-        mass, free = np.zeros((model.nv, model.nv)), _free(model, data)
-        mujoco.mj_fullM(model, data, mass)
-        # slope of force-velocity at rest, isometric, see contractile_velocity
-        yielding = columns["max_velocity"] * hill / (1 + hill * (1 + columns["viscosity"]))
-        elasticity = _elasticity(model, np.abs(arms * force[:, None]).max(axis=0))
-        damping = np.asarray(model.dof_damping, dtype=np.float64).reshape(model.nv, -1)[:, 0]
-        return _Plant(
-            model.dof_jntid.copy(), free, free.T @ mass @ free,
-            free.T @ (damping[:, None] * free), free.T @ (elasticity[:, None] * free),
-            arms @ free, force * per_force, yielding * per_force,
-        )  # fmt: skip
-
-    def modes(self) -> list[tuple[int, float]]:
-        """Joint and natural frequency [rad/s] of each mode, fastest first."""
-        stiffness = self.elasticity + (self.arms.T * self.slopes) @ self.arms
-        inverse = np.linalg.inv(np.linalg.cholesky(self.mass))
-        squares, modes = np.linalg.eigh(inverse @ stiffness @ inverse.T)
-        frequencies = np.sqrt(np.maximum(squares, 0.0))
-        found = zip(self._joints(inverse.T @ modes), frequencies.tolist(), strict=True)
-        return sorted(found, key=lambda pair: -pair[1])
-
-    def growing(self, timestep: float, staged: bool) -> set[int]:
-        """Joints that a timestep [s] makes swing ever wider about rest."""
-        step = self._stages(timestep) if staged else self._step(timestep)
-        sizes, modes = np.linalg.eig(step)
-        movements = modes[: len(self.mass), np.abs(sizes) > 1 + 1e-9]
-        return set(self._joints(np.abs(movements)))
-
-    def _step(self, h: float) -> _Values:
-        """What a single step makes of y, its velocity, and the stretches one step old.
-
-        The scheme advances stretches to the present length; MuJoCo takes viscosity implicitly.
-        """
-        n, m = len(self.mass), len(self.slopes)
-        z = np.maximum(self.relaxation * h, 1e-12)
-        stretch = np.hstack(
-            [np.zeros((m, n)), (-np.expm1(-z) / z * h)[:, None] * self.arms, np.diag(np.exp(-z))]
-        )
-        force = -(self.arms.T * self.slopes) @ stretch
-        force[:, :n] -= self.elasticity
-        momentum = np.hstack([np.zeros((n, n)), self.mass, np.zeros((n, m))])
-        velocity = np.linalg.solve(self.mass + h * self.viscosity, momentum + h * force)
-        position = np.hstack([np.eye(n), np.zeros((n, n + m))]) + h * velocity
-        return np.vstack([position, velocity, stretch])
-
-    def _stages(self, h: float) -> _Values:
-        """The same under RK4, where the scheme relaxes no faster than 2/h."""
-        n, m = len(self.mass), len(self.slopes)
-        inverse = np.linalg.inv(self.mass)
-        rates = h * np.block(
-            [
-                [np.zeros((n, n)), np.eye(n), np.zeros((n, m))],
-                [
-                    -inverse @ self.elasticity,
-                    -inverse @ self.viscosity,
-                    -inverse @ (self.arms.T * self.slopes),
-                ],
-                [np.zeros((m, n)), self.arms, -np.diag(np.minimum(self.relaxation, 2.0 / h))],
-            ]
-        )
-        one = np.eye(len(rates))
-        return one + rates @ (one + rates @ (one / 2 + rates @ (one / 6 + rates / 24)))
-
-    def _joints(self, modes: _Values) -> list[int]:
-        """The joint that moves most in each mode, by kinetic energy."""
-        dofs = np.argmax(np.abs((self.free @ modes) * (self.free @ self.mass @ modes)), axis=0)
-        return [int(joint) for joint in self.joints[dofs]]
-
-
-def _elasticity(model: mujoco.MjModel, torque: _Values) -> _Values:
-    """Stiffness of each degree of freedom's joint under a load, from the muscles' torques."""
-    stiffness = np.zeros(model.nv)
-    for joint in _elastic_joints(model):
-        dof = model.jnt_dofadr[joint]
-        load = PASSIVE_LOAD * torque[dof]
-        k1_pos, k2_pos, k1_neg, k2_neg = model.jnt_user[joint, 1:5].tolist()
-        stiffness[dof] = float(model.jnt_stiffness[joint].flat[0]) + max(
-            k2_pos * (load + k1_pos) if k1_pos else 0.0,
-            k2_neg * (load + k1_neg) if k1_neg else 0.0,
-        )
-    return stiffness
-
-
-def _elastic_joints(model: mujoco.MjModel) -> list[int]:
-    return [joint for joint in range(model.njnt) if has_passive(model, joint)]
-
-
-def _free(model: mujoco.MjModel, data: mujoco.MjData) -> _Values:
-    """Directions in which equality constraints let a model move, as columns."""
-    if not data.ne:
-        return np.eye(model.nv)
-    rows: Any = np.zeros((data.nefc, model.nv))
-    if mujoco.mj_isSparse(model):
-        mujoco.mju_sparse2dense(
-            rows, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
-        )
-    else:
-        rows = data.efc_J.reshape(data.nefc, model.nv)
-    held = rows[data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)]
-    _, sizes, directions = np.linalg.svd(held)
-    rank = int((sizes > 1e-9 * max(sizes.max(), 1e-300)).sum())
-    return np.ascontiguousarray(directions[rank:].T)
+def _options(x: float, y: float, z: float, timestep: float, integrator: float) -> tuple[str, ...]:
+    """Options in words that differ where the options do."""
+    name = mujoco.mjtIntegrator(int(integrator)).name.removeprefix("mjINT_").lower()
+    return (
+        f"gravity {x:g} {y:g} {z:g} m/s²",
+        f"a timestep of {timestep:g} s",
+        f"integrator {name}",
+    )

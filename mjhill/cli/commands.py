@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from mjhill.cli.check import check
 from mjhill.cli.identify import identify
 from mjhill.cli.printing import json_option, print_paths, print_table, progress_bar, shown
 from mjhill.cli.reproduce import reproduce
@@ -43,6 +44,7 @@ def main() -> None:
     """Physiological muscle for MuJoCo: the Hill-based system of Winters & Stark (1987)."""
 
 
+main.add_command(check)
 main.add_command(identify)
 main.add_command(reproduce)
 

@@ -1,0 +1,81 @@
+"""The command ``mjhill check``."""
+
+from __future__ import annotations
+
+import json
+import sys
+import warnings
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+import click
+
+from mjhill.cli.printing import json_option, print_table
+
+if TYPE_CHECKING:
+    import mujoco
+
+SEVERE = 3  # exit code where a finding is severe
+
+
+@click.command()
+@click.argument("model")
+@json_option
+def check(model: str, as_json: bool) -> None:
+    """Check MODEL, a joint's name or a path, and say what makes its results doubtful.
+
+    Exit code 0: nothing, or notes only; 3: something makes results meaningless; 2: the model is
+    refused.
+    """
+    from mjhill.checks import check_model
+    from mjhill.models import load
+    from mjhill.tendons import check_tendons
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # severe findings are in the table
+        loaded = load(model)
+        findings = (*check_model(loaded), *check_tendons(loaded))
+    looked_at = _looked_at(loaded)
+    if as_json:
+        shown = [asdict(finding) for finding in findings]
+        click.echo(json.dumps({"looked_at": looked_at, "findings": shown}, ensure_ascii=False))
+    else:
+        for what, value in looked_at.items():
+            click.echo(f"{what}: {value}")
+        if findings:
+            rows = [
+                {
+                    "about": finding.subject,
+                    "": "severe" if finding.severe else "note",
+                    "finding": finding.problem,
+                    "remedy": finding.remedy,
+                }
+                for finding in findings
+            ]
+            print_table(rows, False, title=f"Findings on {model}")
+        else:
+            click.echo("no findings")
+    if any(finding.severe for finding in findings):
+        sys.exit(SEVERE)
+
+
+def _looked_at(model: mujoco.MjModel) -> dict[str, str | int]:
+    """What was checked, in words for people."""
+    import mujoco
+
+    from mjhill.describe import elastic_joints
+    from mjhill.layout import muscle_ids, muscle_names
+
+    muscles = muscle_ids(model)
+    on_tendons = int((model.actuator_trntype[muscles] == int(mujoco.mjtTrn.mjTRN_TENDON)).sum())
+    gravity = " ".join(f"{value:g}" for value in model.opt.gravity)
+    integrator = mujoco.mjtIntegrator(int(model.opt.integrator)).name.removeprefix("mjINT_")
+    return {
+        "muscles": len(muscle_names(model)),
+        "of these on tendons, paths swept": on_tendons,
+        "joints with passive elasticity": len(list(elastic_joints(model))),
+        "equality constraints": int(model.neq),
+        "timestep [s]": f"{model.opt.timestep:g}",
+        "integrator": integrator,
+        "gravity [m/s²]": gravity,
+    }
