@@ -182,7 +182,7 @@ def divided_stretch(
     """
     elapsed, part = 0.0, 1.0  # in units of dt
     held = False  # whether the hypothetical force is
-    for trial in range(PATIENCE):
+    for _trial in range(PATIENCE):
         now = before + (after - before) * elapsed
         if stretch < 0:  # slack is taken up at its mean rate, to the moment it is taut
             rate, _, _, _, _, _ = stretch_rate(
@@ -260,7 +260,7 @@ def settled_stretch(
     if stretch + dt * slack_rate <= 0.0:
         return stretch + dt * slack_rate
     low, high = 0.0, max(stretch, 0.0) + dt * max(slack_rate, 0.0)
-    for bisection in range(60):
+    for _halving in range(60):
         middle = 0.5 * (low + high)
         rate, _, _, _, _, _ = stretch_rate(
             middle, length_rate, hypothetical, max_velocity, share, hill, plateau, slope_ratio,

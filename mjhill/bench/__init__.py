@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import platform
 from collections.abc import Callable
 from importlib import import_module
 from importlib.metadata import version
+from typing import cast
 
 from mjhill.bench.result import Result
 
-NAMES = ("accuracy", "cost", "threads", "start", "video")  # and sweep, which takes longer
+NAMES = ("accuracy", "cost", "threads", "start", "video")
+LONG = ("sweep", "fuzz", "checks", "endurance")  # minutes each: run by name, one at a time
 
 
 def run(
@@ -23,7 +26,10 @@ def run(
     """
     for name in names:
         if name not in NAMES:
-            raise ValueError(f"unknown benchmark {name!r}; there are: {', '.join(NAMES)}")
+            raise ValueError(
+                f"unknown benchmark {name!r}; there are: {', '.join(NAMES)}"
+                f"; by themselves: {', '.join(LONG)}"
+            )
     chosen = names or NAMES
     results = {}
     for index, name in enumerate(chosen):
@@ -31,6 +37,29 @@ def run(
         if progress is not None:
             progress((index + 1) / len(chosen))
     return results
+
+
+def run_long(
+    name: str,
+    kinds: tuple[str, ...] = (),
+    count: int | None = None,
+    case: str | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """Run a benchmark that takes minutes, one of ``LONG``; see its ``measure``.
+
+    Raises:
+        ValueError: It has no such kind, case or option.
+    """
+    measure = import_module(f"mjhill.bench.{name}").measure
+    options = {"kinds": kinds, "count": count, "case": case}
+    known = inspect.signature(measure).parameters
+    for option, value in options.items():
+        if value and option not in known:
+            word = {"kinds": "--kind"}.get(option, f"--{option}")
+            raise ValueError(f"{word} does not go with mjhill bench {name}")
+    given = {option: value for option, value in options.items() if option in known}
+    return cast(Result, measure(**given, progress=progress))
 
 
 def versions() -> str:

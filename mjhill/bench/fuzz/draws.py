@@ -105,7 +105,7 @@ def random_passive(random: Random, torque: float, length: float, wildness: float
         "k2_neg": log_uniform(random, 0.5, 8) / length,
         "exponent_limit": 20.0,
     }
-    values = {}
+    values: dict[str, Any] = {}
     for name, quantity in quantities(Passive):
         value = anywhere(random, quantity) if chance(random, wildness) else tame[name]
         values[name] = min(value, quantity.high)

@@ -183,6 +183,10 @@ def _spatial(draft: Draft) -> None:
     for _ in range(int(random.integers(1, 4))):
         body = _body(draft, segments[-1], chance(random, 0.1))
         body.pos = [0, 0, 0 if len(segments) == 1 else -reach]
+        if chance(random, 0.6):  # as limbs have, within which a path may stay on its surfaces
+            joint = body.first_joint()
+            joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+            joint.range = [-float(random.uniform(0.1, 1)), float(random.uniform(0.1, 1))]
         segments.append(body)
     for index, (name, part) in enumerate(plans):
         last = int(random.integers(1, len(segments)))
@@ -208,7 +212,7 @@ def _path(
                 euler=[np.pi / 2, 0, 0], mass=0, contype=0, conaffinity=0,
             )  # fmt: skip
             sidesite = ""
-            if chance(random, 0.6):
+            if chance(random, 0.85):
                 sidesite = f"{name}.side{order}"
                 body.add_site(name=sidesite, pos=[side * 2 * radius, 0, 0])
             tendon.wrap_geom(wrap, sidesite)

@@ -6,7 +6,6 @@ import math
 import warnings
 from copy import copy
 from dataclasses import dataclass
-from typing import Any
 from zlib import crc32
 
 import mujoco
@@ -17,8 +16,9 @@ from numpy.typing import NDArray
 from mjhill.bench.fuzz.draws import Random, chance, log_uniform
 from mjhill.bench.fuzz.models import KINDS, random_model
 from mjhill.checks import Finding, check_model
-from mjhill.equilibrium import check_finite, check_states, equilibrate
+from mjhill.equilibrium import check_states, equilibrate
 from mjhill.layout import STATES, muscle_ids, parameter_columns
+from mjhill.tendons import check_tendons
 
 STEPS = 400
 HOLD = 20  # steps between changes of the controls
@@ -68,6 +68,7 @@ class Outcome:
         failures: What a muscle cannot do and the run did; empty where all was well.
         findings: Severe findings, and errors of the checks.
         hints: Findings that are not severe.
+        plant: Whether MuJoCo warns of the same run without muscles and elasticities of ours.
     """
 
     case: str
@@ -78,10 +79,21 @@ class Outcome:
     findings: tuple[str, ...]
     hints: tuple[str, ...]
 
+    plant: bool
+
     @property
-    def silent(self) -> bool:
-        """Whether it failed and nothing had foretold it."""
-        return bool(self.failures) and not self.findings
+    def kind(self) -> str:
+        """Kind of model."""
+        return self.case.partition(":")[0]
+
+    @property
+    def verdict(self) -> str:
+        """In a word: sound, foretold, finding only (and no failure), plant or silent."""
+        if not self.failures:
+            return "finding only" if self.findings else "sound"
+        if self.findings:
+            return "foretold"
+        return "plant" if self.plant else "silent"
 
 
 def draw(kind: str, number: int) -> Case:
@@ -100,6 +112,8 @@ def draw(kind: str, number: int) -> Case:
     start = str(random.choice(["reset", "near", "far", "act"], p=[0.25, 0.45, 0.15, 0.15]))
     if start != "reset":
         _pose(random, model, data, reach * log_uniform(random, 0.1, 1), start == "far")
+        if start != "far" and chance(random, 0.8):
+            _hold_equalities(model, data)
     controls = _controls(random, model)
     data.ctrl[:] = controls[0]
     if start in ("near", "act") or (start == "far" and chance(random, 0.7)):
@@ -115,9 +129,11 @@ def run(kind: str, number: int) -> Outcome:
     """Check a case, then run it. Callbacks must be installed."""
     case = draw(kind, number)
     findings, hints = _foretold(case)
+    failures = _failures(case)
+    plant = any(failure.startswith("WARN") for failure in failures) and _plant_warns(case)
     return Outcome(
         case.name, mujoco.mjtIntegrator(case.model.opt.integrator).name[6:].lower(),
-        float(case.model.opt.timestep), case.start, _failures(case), findings, hints,
+        float(case.model.opt.timestep), case.start, failures, findings, hints, plant,
     )  # fmt: skip
 
 
@@ -134,6 +150,14 @@ def _pose(
         data.qpos[model.jnt_qposadr[joint]] += position
         if chance(random, 0.3):
             data.qvel[model.jnt_dofadr[joint]] = float(random.normal()) * 3.0 * reach
+
+
+def _hold_equalities(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Where something is held together that the pose has torn apart, back to ``qpos0``, still."""
+    mujoco.mj_fwdPosition(model, data)
+    if data.ne and np.abs(data.efc_pos[: data.ne]).max() > 1e-6:
+        data.qpos[:] = model.qpos0
+        data.qvel[:] = 0.0
 
 
 def _equilibrate(model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -171,6 +195,7 @@ def _foretold(case: Case) -> tuple[tuple[str, ...], tuple[str, ...]]:
         warnings.simplefilter("ignore", RuntimeWarning)
         try:
             found += check_model(case.model)
+            found += check_tendons(case.model)
         except ValueError as error:
             errors.append(f"check_model: {error}")
     try:
@@ -189,33 +214,45 @@ def _copy(case: Case) -> mujoco.MjData:
 
 def _failures(case: Case) -> tuple[str, ...]:
     """What a run of a case shows that no muscle does."""
-    model, data = case.model, _copy(case)
+    return impossible(case.model, _copy(case), case.controls, mujoco.mjtState.mjSTATE_CTRL)
+
+
+def impossible(
+    model: mujoco.MjModel, data: mujoco.MjData, inputs: _Values, spec: mujoco.mjtState
+) -> tuple[str, ...]:
+    """What a run shows that no muscle does; warnings of bad controls only where there are none.
+
+    Args:
+        model: A model; its sensors are the forces of its muscles.
+        data: Where it starts; its state and warnings afterwards are those of the end.
+        inputs: Inputs of each step, shape (steps, size of ``spec``).
+        spec: What the inputs are.
+    """
     start = np.empty(mujoco.mj_stateSize(model, _FULL))
     mujoco.mj_getState(model, data, start, _FULL)
-    states, sensed = mujoco.rollout.rollout(model, data, start[None], case.controls[None])
+    found, sensed = mujoco.rollout.rollout(
+        model, data, start[None], inputs[None], control_spec=int(spec)
+    )
     # past act is the history of delays, which holds controls as they were given
-    states, tension = states[0][:, : 1 + model.nq + model.nv + model.na], -np.asarray(sensed[0])
-    failures = ["plant"] if data.warning.number.any() and _plant_fails(case) else []
+    states, tension = found[0][:, : 1 + model.nq + model.nv + model.na], -np.asarray(sensed[0])
     counts = data.warning.number.copy()
-    if not _is_control(case.controls).all():
+    if not (np.abs(inputs) <= mujoco.mjMAXVAL).all():
         counts[int(mujoco.mjtWarning.mjWARN_BADCTRL)] = 0  # MuJoCo is right to warn
-    failures += [mujoco.mjtWarning(int(i)).name[2:] for i in np.flatnonzero(counts)]
+    failures = [mujoco.mjtWarning(int(i)).name[2:] for i in np.flatnonzero(counts)]
     if not (np.isfinite(states).all() and np.isfinite(tension).all()):
         failures.append("not finite")
     muscles = muscle_ids(model)
-    first = 1 + model.nq + model.nv
-    act = states[:, first : first + model.na].reshape(STEPS, len(muscles), STATES)
+    act = states[:, 1 + model.nq + model.nv :].reshape(len(states), len(muscles), STATES)
     if (act[..., :2] < -ROUNDING).any() or (act[..., :2] > 1 + ROUNDING).any():
         failures.append("n or a outside")
-    strongest = parameter_columns(model, muscles)["max_isometric_force"]
     if (tension < 0).any():
         failures.append("pushes")
-    if (tension > STRONGEST * strongest).any():
+    if (tension > STRONGEST * parameter_columns(model, muscles)["max_isometric_force"]).any():
         failures.append("too strong")
     return tuple(failures)
 
 
-def _plant_fails(case: Case) -> bool:
+def _plant_warns(case: Case) -> bool:
     """Whether MuJoCo warns of the same run without muscles and elasticities of ours."""
     model, data = copy(case.model), _copy(case)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
@@ -223,7 +260,3 @@ def _plant_fails(case: Case) -> bool:
         model.jnt_user[:] = 0.0
     mujoco.mj_step(model, data, STEPS)
     return bool(data.warning.number.any())
-
-
-def _is_control(values: Any) -> Any:
-    return np.abs(values) <= mujoco.mjMAXVAL
