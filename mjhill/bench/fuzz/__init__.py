@@ -73,7 +73,7 @@ def fuzz(
     outcomes: list[Outcome] = []
     with installed():  # so that the machine code is in the cache before processes ask for it
         if processes == 1:
-            with _quiet():
+            with quiet():
                 return [run(*job) for job in jobs]
     chunks = [jobs[first : first + _CHUNK] for first in range(0, count, _CHUNK)]
     with (
@@ -96,17 +96,17 @@ def replay(case: str) -> Outcome:
     kind, _, number = case.partition(":")
     if not number.isdecimal():
         raise ValueError(f"a case is named KIND:NUMBER, such as {KINDS[0]}:17, got {case!r}")
-    with installed(), _quiet():
+    with installed(), quiet():
         return run(kind, int(number))
 
 
 def _outcomes(jobs: list[tuple[str, int]]) -> list[Outcome]:
-    with installed(), _quiet():
+    with installed(), quiet():
         return [run(*job) for job in jobs]
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Without a line for each warning of MuJoCo, which are counted in the data."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: None)

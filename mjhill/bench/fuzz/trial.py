@@ -214,35 +214,34 @@ def _copy(case: Case) -> mujoco.MjData:
 
 def _failures(case: Case) -> tuple[str, ...]:
     """What a run of a case shows that no muscle does."""
-    return impossible(case.model, _copy(case), case.controls, mujoco.mjtState.mjSTATE_CTRL)
+    model, data = case.model, _copy(case)
+    start = np.empty(mujoco.mj_stateSize(model, _FULL))
+    mujoco.mj_getState(model, data, start, _FULL)
+    states, sensed = mujoco.rollout.rollout(model, data, start[None], case.controls[None])
+    counts = data.warning.number.copy()
+    if not (np.abs(case.controls) <= mujoco.mjMAXVAL).all():
+        counts[int(mujoco.mjtWarning.mjWARN_BADCTRL)] = 0  # MuJoCo is right to warn
+    # past act is the history of delays, which holds controls as they were given
+    physics = states[0][:, : 1 + model.nq + model.nv + model.na]
+    return impossible(model, physics, -np.asarray(sensed[0]), counts)
 
 
 def impossible(
-    model: mujoco.MjModel, data: mujoco.MjData, inputs: _Values, spec: mujoco.mjtState
+    model: mujoco.MjModel, states: _Values, tension: _Values, warned: NDArray[np.int32]
 ) -> tuple[str, ...]:
-    """What a run shows that no muscle does; warnings of bad controls only where there are none.
+    """What a run shows that no muscle does.
 
     Args:
-        model: A model; its sensors are the forces of its muscles.
-        data: Where it starts; its state and warnings afterwards are those of the end.
-        inputs: Inputs of each step, shape (steps, size of ``spec``).
-        spec: What the inputs are.
+        model: A model whose actuators are all muscles.
+        states: State after each step, ``act`` last, shape (steps, size).
+        tension: Of each muscle in each step, shape (steps, nmuscle).
+        warned: How often MuJoCo gave each of its warnings.
     """
-    start = np.empty(mujoco.mj_stateSize(model, _FULL))
-    mujoco.mj_getState(model, data, start, _FULL)
-    found, sensed = mujoco.rollout.rollout(
-        model, data, start[None], inputs[None], control_spec=int(spec)
-    )
-    # past act is the history of delays, which holds controls as they were given
-    states, tension = found[0][:, : 1 + model.nq + model.nv + model.na], -np.asarray(sensed[0])
-    counts = data.warning.number.copy()
-    if not (np.abs(inputs) <= mujoco.mjMAXVAL).all():
-        counts[int(mujoco.mjtWarning.mjWARN_BADCTRL)] = 0  # MuJoCo is right to warn
-    failures = [mujoco.mjtWarning(int(i)).name[2:] for i in np.flatnonzero(counts)]
+    failures = [mujoco.mjtWarning(int(i)).name[2:] for i in np.flatnonzero(warned)]
     if not (np.isfinite(states).all() and np.isfinite(tension).all()):
         failures.append("not finite")
     muscles = muscle_ids(model)
-    act = states[:, 1 + model.nq + model.nv :].reshape(len(states), len(muscles), STATES)
+    act = states[:, -model.na :].reshape(len(states), len(muscles), STATES)
     if (act[..., :2] < -ROUNDING).any() or (act[..., :2] > 1 + ROUNDING).any():
         failures.append("n or a outside")
     if (tension < 0).any():
