@@ -29,6 +29,7 @@ from mjhill.parameters import Muscle, quantities
 from mjhill.stability import Plant
 
 COARSE = 0.3  # stiffness, in units of what a timestep can hold, from which 5 % may be lost
+STEPS = 12  # timesteps a period below which a movement with little damping may be off by 5 %
 # custom numeric with the options that a model is made for: gravity, timestep, integrator
 MADE_FOR = "mjhill_made_for"
 
@@ -189,33 +190,39 @@ def _check_elasticities(model: mujoco.MjModel) -> None:
 
 
 def _fast_joints(model: mujoco.MjModel, names: list[str]) -> Iterator[Finding]:
-    """Findings on joints that muscles make too stiff for the timestep."""
+    """Findings on joints that muscles make too stiff for the timestep, one for each joint."""
     timestep = float(model.opt.timestep)
-    overloads = [(part, part.overloads(timestep, COARSE)) for part in Plant.parts(model)]
-    overloads = [(part, modes) for part, modes in overloads if modes]
-    if not overloads:
+    parts = Plant.parts(model)
+    overloads = [mode for part in parts for mode in part.overloads(timestep, COARSE)]
+    swings = [swing for part in parts for swing in part.swings(2 * math.pi / (STEPS * timestep))]
+    if not overloads and not swings:
         return
-    joints, seen = joint_names(model), set()
-    enough = min(part.longest(timestep, COARSE) for part, _ in overloads)
-    for mode in sorted((m for _, modes in overloads for m in modes), key=lambda m: -m.load):
-        if mode.joint in seen:
-            continue
-        seen.add(mode.joint)
-        severe = mode.load >= 1
+    enough = min(part.longest(timestep, COARSE) for part in parts)
+    enough = min([enough, *(0.999 * swing.period / STEPS for swing in swings)])
+    remedy = f"set model.opt.timestep to {_rounded_down(enough):g} s or less"
+    joints, found = joint_names(model), dict[int, Finding]()
+    for mode in sorted(overloads, key=lambda mode: -mode.load):
+        muscles = ", ".join(repr(names[muscle]) for muscle in mode.muscles)
         effect = (
             "so it is unstable there: forces change sign from step to step"
-            if severe
+            if mode.load >= 1
             else f"and from {COARSE:g} on results may be off by 5 %"
         )
-        muscles = ", ".join(repr(names[muscle]) for muscle in mode.muscles)
-        yield Finding(
-            f"joint {joints[mode.joint]!r}",
-            f"with its muscles at full force ({muscles}) its stiffness is {mode.load:.2g} of "
-            f"what a timestep of {timestep:g} s can hold, {effect}",
-            f"set model.opt.timestep to {_rounded_down(enough):g} s or less",
-            severe,
-            enough,
+        problem = (
+            f"with its muscles at full force ({muscles}) its stiffness is {mode.load:.2g} of what "
+            f"a timestep of {timestep:g} s can hold, {effect}"
         )
+        subject = f"joint {joints[mode.joint]!r}"
+        found.setdefault(mode.joint, Finding(subject, problem, remedy, mode.load >= 1, enough))
+    for swing in swings:
+        problem = (
+            f"with its muscles at full force it swings with little damping and a period of "
+            f"{swing.period:.2g} s, {swing.period / timestep:.2g} timesteps; below {STEPS} results "
+            "may be off by 5 %"
+        )
+        subject = f"joint {joints[swing.joint]!r}"
+        found.setdefault(swing.joint, Finding(subject, problem, remedy, False, enough))
+    yield from found.values()
 
 
 def _rounded_down(timestep: float) -> float:

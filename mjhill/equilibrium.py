@@ -8,8 +8,26 @@ import mujoco
 import numpy as np
 
 from mjhill.callbacks.python import control
-from mjhill.elements import active_length_factor, hypothetical_force, series_stretch_at
-from mjhill.layout import STATES, muscle_ids, parameter_columns
+from mjhill.elements import (
+    active_length_factor,
+    hypothetical_force,
+    passive_torque,
+    series_force,
+    series_stretch_at,
+)
+from mjhill.layout import (
+    NUSER_JNT,
+    STATES,
+    actuator_names,
+    has_passive,
+    joint_names,
+    muscle_ids,
+    parameter_columns,
+    read_passive,
+)
+
+STRONGEST = 3.0  # tension that no muscle has [F_max]
+ROUNDING = 1e-6  # by which n and a may be outside [0, 1]
 
 _HOME = "home"
 # the parameters on which the steady state depends, in the order in which it is computed
@@ -93,34 +111,94 @@ def check_finite(data: mujoco.MjData) -> None:
 
 
 def check_states(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Refuse data in which a muscle's states cannot be those of a muscle.
+    """Refuse data that no muscle and no elasticity could be in, or that no step could leave well.
 
     Raises:
-        ValueError: n or a is outside [0, 1], or s is not a number or off by more than the series
-            element could ever be stretched; the message names the muscle.
+        ValueError: n or a is outside [0, 1]; s is not a number, or would stretch or slacken the
+            series element beyond what it can be; a muscle is torn apart so fast that it would
+            carry more than ``STRONGEST``; or a joint is so deep in its passive elasticity that
+            the timestep cannot follow. The message names the muscle or joint.
     """
-    from mjhill.layout import actuator_names
-
     mujoco.mj_fwdPosition(model, data)
     muscles = muscle_ids(model)
+    if muscles:
+        _check_muscles(model, data, muscles)
+    elastic = [joint for joint in range(model.njnt) if has_passive(model, joint)]
+    if elastic:
+        _check_elasticities(model, data, elastic)
+
+
+def _check_muscles(model: mujoco.MjModel, data: mujoco.MjData, muscles: list[int]) -> None:
+    mujoco.mj_fwdVelocity(model, data)
     outs, first = model.actuator_outadr[muscles], model.actuator_actadr[muscles]
-    stretch = data.actuator_length[outs] - model.actuator_length0[outs] - data.act[first + 2]
+    states = data.act[first[:, None] + np.arange(STATES)]
     columns = parameter_columns(model, muscles)
-    span = 10 * columns["series_limit"] * columns["series_stretch"] + 10 * (
-        columns["width_short"] + columns["width_long"]
-    )
-    for row, actuator in enumerate(muscles):
-        n, a, s = data.act[first[row] : first[row] + STATES].tolist()
-        # a little outside: RK4 may end a step there
-        for what, value in (("n", n), ("a", a)):
-            if not -0.1 <= value <= 1.1:
-                raise ValueError(
-                    f"muscle {actuator_names(model)[actuator]!r}: its state {what} must be in "
-                    f"[0, 1], got {value:g}; call mjhill.equilibrate(model, data)"
-                )
-        if not abs(stretch[row]) <= span[row]:
+    stretch = data.actuator_length[outs] - model.actuator_length0[outs] - states[:, 2]
+    slackest = 10 * (columns["series_stretch"] + columns["width_short"] + columns["width_long"])
+    # tension in fast lengthening [F_max], see contractile_velocity
+    slowest = columns["max_velocity"] * (1 - columns["velocity_activation"])
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        torn = columns["eccentric_plateau"] + columns["viscosity"] * (
+            np.maximum(data.actuator_velocity[outs], 0.0) / slowest
+        )
+    inside = ((states[:, :2] >= -ROUNDING) & (states[:, :2] <= 1 + ROUNDING)).all(axis=1)
+    good = inside & (stretch >= -slackest) & (torn <= STRONGEST)
+    elements = zip(*(columns[name].tolist() for name in _SERIES), strict=True)
+    tensions = [series_force(x, *element)[0] for x, element in zip(stretch, elements, strict=True)]
+    for row in np.flatnonzero(~(good & (np.array(tensions) <= STRONGEST))).tolist():
+        subject = f"muscle {actuator_names(model)[muscles[row]]!r}"
+        n, a, s = states[row].tolist()
+        remedy = "call mjhill.equilibrate(model, data)"
+        if not inside[row]:
+            what, value = ("n", n) if not -ROUNDING <= n <= 1 + ROUNDING else ("a", a)
             raise ValueError(
-                f"muscle {actuator_names(model)[actuator]!r}: its contractile length s = {s:g} "
-                f"would stretch the series element by {stretch[row]:g}, far beyond what it "
-                "carries; call mjhill.equilibrate(model, data)"
+                f"{subject}: its state {what} must be in [0, 1], got {value:g}; {remedy}"
+            )
+        if torn[row] > STRONGEST:
+            raise ValueError(
+                f"{subject}: it is lengthened at {data.actuator_velocity[outs[row]]:.3g} per "
+                f"second and would carry {torn[row]:.3g} F_max, above {STRONGEST:g}; start slower"
+            )
+        raise ValueError(
+            f"{subject}: its contractile length s = {s:g} would stretch the series element by "
+            f"{stretch[row]:g}, to {tensions[row]:.3g} F_max; allowed are {STRONGEST:g} F_max at "
+            f"most, and a stretch of {-slackest[row]:.3g} at least; {remedy}"
+        )
+
+
+def _check_elasticities(model: mujoco.MjModel, data: mujoco.MjData, elastic: list[int]) -> None:
+    """Refuse a start so deep in an exponential that a step moves it by half an e-fold."""
+    timestep, names = float(model.opt.timestep), joint_names(model)
+    for joint in elastic:
+        dof = model.jnt_dofadr[joint]
+        passive = read_passive(model, names[joint])
+        deviation = float(
+            data.qpos[model.jnt_qposadr[joint]] - model.qpos_spring[model.jnt_qposadr[joint]]
+        )
+        k1, k2 = (
+            (passive.k1_pos, passive.k2_pos) if deviation >= 0 else (passive.k1_neg, passive.k2_neg)
+        )
+        torque = abs(passive_torque(deviation, 0.0, *model.jnt_user[joint, 1:NUSER_JNT].tolist()))
+        unit = np.zeros((1, model.nv))
+        unit[0, dof] = 1.0
+        mobility = np.zeros((1, model.nv))
+        mujoco.mj_solveM(model, data, mobility, unit)
+        # the slope of an exponential is its value times its rate, and its energy value over rate
+        slope, energy = k2 * (torque + k1), torque / k2
+        speed = math.hypot(data.qvel[dof], math.sqrt(2 * energy * mobility[0, dof]))
+        stiffness = timestep * math.sqrt(slope * mobility[0, dof])
+        rates = [
+            rate
+            for scale, rate in (
+                (passive.k1_pos, passive.k2_pos),
+                (passive.k1_neg, passive.k2_neg),
+            )
+            if scale > 0
+        ]
+        reach = timestep * speed * max(rates, default=0.0)
+        if max(stiffness, reach) > 0.5:
+            raise ValueError(
+                f"joint {names[joint]!r}: at {deviation:.3g} from rest its passive elasticity "
+                f"pushes with {torque:.3g}, and a timestep of {timestep:g} s cannot follow what "
+                "comes of that; start nearer to rest, or set a shorter model.opt.timestep"
             )

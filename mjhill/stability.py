@@ -23,6 +23,7 @@ PASSIVE_LOAD = 2.0  # passive torque that a movement may meet, in units of the s
 # largest (frequency x timestep)² and rate x timestep of RK4, for any damping
 _STAGED_SPRING, _STAGED_RATE = 7.3, 2.7
 
+LITTLE = 0.3  # twice the damping ratio below which a movement swings on
 _LARGE = 64  # degrees of freedom from which a model is taken in parts
 
 _Values = NDArray[np.float64]
@@ -41,6 +42,19 @@ class Mode:
     load: float
     joint: int
     muscles: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A movement that goes on by itself, because muscles and joints take little of its energy.
+
+    Attributes:
+        period: [s].
+        joint: Id of the joint that moves most.
+    """
+
+    period: float
+    joint: int
 
 
 @dataclass(frozen=True)
@@ -143,6 +157,24 @@ class Plant:
         """The load of the heaviest movement."""
         loads, _ = self._modes(timestep)
         return float(loads.max())
+
+    def swings(self, fastest: float) -> list[Swing]:
+        """Movements with little damping, of a natural frequency [rad/s] of ``fastest`` or more."""
+        springs = (self.arms.T * self.slopes) @ self.arms + self.elasticity
+        if _is_positive(fastest**2 * self.mass - springs):
+            return []
+        inverse = np.linalg.inv(np.linalg.cholesky(self.mass))
+        squares, modes = np.linalg.eigh(inverse @ springs @ inverse.T)
+        modes = inverse.T @ modes
+        found = []
+        for k in np.flatnonzero(squares >= fastest**2)[::-1]:
+            mode, frequency = modes[:, k], float(np.sqrt(squares[k]))
+            # shares of a muscle's stiffness that act as a spring's, and the share lost to yielding
+            shares = self.slopes * (self.arms @ mode) ** 2 / squares[k]
+            lost = shares @ (frequency * self.relaxation / (squares[k] + self.relaxation**2))
+            if lost + mode @ self.viscosity @ mode / frequency < LITTLE:
+                found.append(Swing(2 * np.pi / frequency, self._joint(mode)))
+        return found
 
     def longest(self, timestep: float, limit: float) -> float:
         """A timestep [s], shorter than the given one, at which no load reaches ``limit``."""
