@@ -130,6 +130,8 @@ def table(outcomes: Sequence[Outcome]) -> Result:
         f"{STEPS} steps each; a failure: a warning of MuJoCo, a state that is not finite, n or a "
         f"outside [0, 1], tension below 0 or above {STRONGEST:g} F_max; foretold: with a severe "
         "finding of check_model or check_tendons, or an error of a check",
+        "reported: by mjhill.record, which names what no muscle can do and refuses what MuJoCo "
+        "warns of",
         "plant: MuJoCo warns of the same run without muscles and elasticities of ours too",
         "failures: " + ", ".join(f"{name} {n}" for name, n in kinds.most_common()),
         f"goal: none silent; there are {len(silent)}",
@@ -141,7 +143,7 @@ def table(outcomes: Sequence[Outcome]) -> Result:
 def _row(kind: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
     verdicts = Counter(outcome.verdict for outcome in outcomes)
     row: dict[str, Any] = {"models": kind, "n": len(outcomes)}
-    for verdict in ("sound", "foretold", "finding only", "plant", "silent"):
+    for verdict in ("sound", "finding only", "foretold", "reported", "plant", "silent"):
         row[verdict] = verdicts[verdict]
     return row
 

@@ -17,7 +17,9 @@ from mjhill.bench.fuzz.draws import Random, chance, log_uniform
 from mjhill.bench.fuzz.models import KINDS, random_model
 from mjhill.checks import Finding, check_model
 from mjhill.equilibrium import check_states, equilibrate
-from mjhill.layout import STATES, muscle_ids, parameter_columns
+from mjhill.layout import STATES, addresses, muscle_ids, parameter_columns
+from mjhill.run import record
+from mjhill.signals import Signal
 from mjhill.tendons import check_tendons
 
 STEPS = 400
@@ -69,6 +71,7 @@ class Outcome:
         findings: Severe findings, and errors of the checks.
         hints: Findings that are not severe.
         plant: Whether MuJoCo warns of the same run without muscles and elasticities of ours.
+        reported: What ``mjhill.record`` says of the same run, where nothing was foretold.
     """
 
     case: str
@@ -80,6 +83,7 @@ class Outcome:
     hints: tuple[str, ...]
 
     plant: bool
+    reported: str
 
     @property
     def kind(self) -> str:
@@ -88,12 +92,14 @@ class Outcome:
 
     @property
     def verdict(self) -> str:
-        """In a word: sound, foretold, finding only (and no failure), plant or silent."""
+        """In a word: sound, foretold, finding only (and no failure), plant, reported or silent."""
         if not self.failures:
             return "finding only" if self.findings else "sound"
         if self.findings:
             return "foretold"
-        return "plant" if self.plant else "silent"
+        if self.plant:
+            return "plant"
+        return "reported" if self.reported else "silent"
 
 
 def draw(kind: str, number: int) -> Case:
@@ -130,10 +136,12 @@ def run(kind: str, number: int) -> Outcome:
     case = draw(kind, number)
     findings, hints = _foretold(case)
     failures = _failures(case)
-    plant = any(failure.startswith("WARN") for failure in failures) and _plant_warns(case)
+    warned = any(failure.startswith("WARN") for failure in failures)
+    reported = "" if not failures or findings else _reported(case)
     return Outcome(
         case.name, mujoco.mjtIntegrator(case.model.opt.integrator).name[6:].lower(),
-        float(case.model.opt.timestep), case.start, failures, findings, hints, plant,
+        float(case.model.opt.timestep), case.start, failures, findings, hints,
+        warned and _plant_warns(case), reported,
     )  # fmt: skip
 
 
@@ -259,3 +267,31 @@ def _plant_warns(case: Case) -> bool:
         model.jnt_user[:] = 0.0
     mujoco.mj_step(model, data, STEPS)
     return bool(data.warning.number.any())
+
+
+def _reported(case: Case) -> str:
+    """What ``record`` says of a run; empty if nothing.
+
+    Where one control is none, MuJoCo takes 0 for all.
+    """
+    model, timestep = case.model, float(case.model.opt.timestep)
+    good = (np.abs(case.controls) <= mujoco.mjMAXVAL).all(axis=1)
+    inputs = np.where(good[:, None], case.controls, 0.0)
+    excitation = {name: _held(inputs[:, at.ctrl], timestep) for name, at in addresses(model)}
+    data = _copy(case)
+    data.ctrl[:] = inputs[0]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        warnings.filterwarnings("error", "muscle .* did what no muscle can", RuntimeWarning)
+        try:
+            record(model, data, excitation=excitation, duration=STEPS * timestep)
+        except (RuntimeError, RuntimeWarning) as said:
+            return str(said)
+        except ValueError:  # refused for its inputs, which says nothing of the failure
+            return ""
+    return ""
+
+
+def _held(levels: _Values, timestep: float) -> Signal:
+    """Levels, each held for a timestep [s]."""
+    return Signal(lambda time: float(levels[min(int(time / timestep), len(levels) - 1)]))
