@@ -1,7 +1,11 @@
 """Physiological muscle for MuJoCo: the Hill-based system of Winters & Stark (1987)."""
 
+from typing import TYPE_CHECKING, Any
+
 from mjhill import reference as reference
 from mjhill.checks import check_model as check_model
+from mjhill.energy import Energy as Energy
+from mjhill.energy import energy as energy
 from mjhill.equilibrium import at_home as at_home
 from mjhill.equilibrium import equilibrate as equilibrate
 from mjhill.equivalent import anatomical_muscle as anatomical_muscle
@@ -23,9 +27,6 @@ from mjhill.parameters import Joint as Joint
 from mjhill.parameters import Muscle as Muscle
 from mjhill.parameters import Passive as Passive
 from mjhill.recording import Recording as Recording
-from mjhill.rendering import View as View
-from mjhill.rendering import render as render
-from mjhill.rendering import snapshot as snapshot
 from mjhill.run import record as record
 from mjhill.signals import Signal as Signal
 from mjhill.signals import constant as constant
@@ -35,5 +36,23 @@ from mjhill.signals import step as step
 from mjhill.spec import add_muscle as add_muscle
 from mjhill.spec import add_passive as add_passive
 from mjhill.tendons import check_tendons as check_tendons
+from mjhill.transients import Transient as Transient
+from mjhill.transients import transients as transients
+
+if TYPE_CHECKING:
+    from mjhill.rendering import View as View
+    from mjhill.rendering import draw_muscles as draw_muscles
+    from mjhill.rendering import render as render
+    from mjhill.rendering import snapshot as snapshot
+    from mjhill.rendering import view as view
 
 __version__ = "0.1.0"
+
+
+def __getattr__(name: str) -> Any:
+    """What draws is loaded when it is asked for: ``import mujoco`` loads this package too."""
+    if name in ("View", "draw_muscles", "render", "snapshot", "view"):
+        from mjhill import rendering
+
+        return getattr(rendering, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -23,11 +23,16 @@ from mjhill.callbacks.slots import (
     NAMES,
     PROCESS,
     TYPES,
+    Slot,
     global_pointer,
     read,
+    restore,
 )
 
 VARIABLE = "MJHILL_AUTOLOAD"
+
+# calls by models without our elasticity, after which making the guard is worth its 40 ms
+_BEFORE_GUARD = 1000
 
 
 def start() -> None:
@@ -37,27 +42,42 @@ def start() -> None:
     with PROCESS.lock:
         if PROCESS.automatic or PROCESS.installations:
             return
-        PROCESS.served.update((name, read(name)) for name in NAMES)
-        if any(slot.is_python for slot in PROCESS.served.values()):
-            PROCESS.served.clear()  # cannot be passed on to from C; mjhill.install() does so
-            return
-        stubs = {
-            "act_dyn": TYPES["act_dyn"](_act_dyn),
-            "act_bias": TYPES["act_bias"](_act_bias),
-            "passive": TYPES["passive"](_passive),
-        }
-        PROCESS.kept.append(stubs)
-        for name, stub in stubs.items():
-            getattr(mujoco, f"set_mjcb_{name}")(stub)
-            PROCESS.automatic[name] = {_address(stub)}
+        served = {name: read(name) for name in NAMES}
+        if any(slot.is_python for slot in served.values()):
+            return  # cannot be passed on to from C; mjhill.install() does so
+        try:
+            _put_stubs(served)
+        except BaseException:
+            # import mujoco makes a warning of it and goes on, with callbacks as they were
+            PROCESS.automatic.clear()
+            PROCESS.served.clear()
+            restore(served)
+            raise
+
+
+def _put_stubs(served: dict[str, Slot]) -> None:
+    stubs = {
+        "act_dyn": TYPES["act_dyn"](_act_dyn),
+        "act_bias": TYPES["act_bias"](_act_bias),
+        "passive": TYPES["passive"](_passive),
+    }
+    PROCESS.served.update(served)
+    PROCESS.kept.append(stubs)
+    for name, stub in stubs.items():
+        getattr(mujoco, f"set_mjcb_{name}")(stub)
+        PROCESS.automatic[name] = {_address(stub)}
 
 
 class _Loaded:
-    """The machine code as ctypes functions, or why there is none."""
+    """What has been loaded for the first model that asked for it."""
 
     def __init__(self) -> None:
-        self.functions: dict[str, Any] | None = None
+        self.functions: dict[str, Any] | None = None  # the machine code, as ctypes functions
         self.tried = False
+        self.offsets: tuple[int, int] | None = None  # see _offsets
+        self.looked = False
+        self.foreign = 0  # calls of the passive stub by models without our elasticity
+        self.guarded = False  # or tried to be; see _put_guard
 
 
 _loaded = _Loaded()
@@ -72,41 +92,64 @@ def _act_bias(m: int, d: int, actuator: int) -> float:
 
 
 def _actuator(name: str, m: int, d: int, actuator: int) -> float:
-    if _is_muscle(m, actuator):
+    from mjhill.layout import MUSCLE_TAG
+
+    offsets, passed_on = _offsets(), PROCESS.served[name].pointer
+    if offsets and _tag(m + offsets[1], actuator) == MUSCLE_TAG:
         functions = _functions()
         # what cannot be computed must not look like a relaxed muscle
         return float(functions[name](m, d, actuator)) if functions else math.nan
-    passed_on = PROCESS.served[name].pointer
-    return float(TYPES[name](passed_on)(m, d, actuator)) if passed_on else 0.0
+    if passed_on:
+        return float(TYPES[name](passed_on)(m, d, actuator))
+    return 0.0 if offsets else math.nan
 
 
 def _passive(m: int, d: int) -> None:
     from mjhill.layout import NUSER_JNT
 
-    if _nuser_jnt(m) >= NUSER_JNT:
+    offsets, passed_on = _offsets(), PROCESS.served["passive"].pointer
+    if offsets and ctypes.c_int64.from_address(m + offsets[0]).value >= NUSER_JNT:
         functions = _functions()
         if functions:
             functions["passive"](m, d)
         return
-    _put_guard(NUSER_JNT)
-    passed_on = PROCESS.served["passive"].pointer
     if passed_on:
         TYPES["passive"](passed_on)(m, d)
+    _loaded.foreign += 1
+    if offsets and _loaded.foreign >= _BEFORE_GUARD and not _loaded.guarded:
+        _put_guard(offsets[0], NUSER_JNT)
 
 
-def _is_muscle(m: int, actuator: int) -> bool:
-    from mjhill.callbacks.structs import offset
-    from mjhill.layout import MUSCLE_TAG
-
-    rows = ctypes.c_void_p.from_address(m + offset("mjModel.actuator_dynprm")).value
+def _tag(pointer: int, actuator: int) -> float:
+    """The first of an actuator's ten ``dynprm``, whose array a pointer at an address points to."""
+    rows = ctypes.c_void_p.from_address(pointer).value
     assert rows is not None
-    return ctypes.c_double.from_address(rows + 80 * actuator).value == MUSCLE_TAG
+    return ctypes.c_double.from_address(rows + 80 * actuator).value
 
 
-def _nuser_jnt(m: int) -> int:
-    from mjhill.callbacks.structs import offset
+def _offsets() -> tuple[int, int] | None:
+    """Where ``nuser_jnt`` and ``actuator_dynprm`` are in ``mjModel``, checked once.
 
-    return ctypes.c_int64.from_address(m + offset("mjModel.nuser_jnt")).value
+    None where that cannot be known, and while it is being checked, which runs a small model.
+    """
+    if _loaded.offsets is not None:
+        return _loaded.offsets
+    with PROCESS.lock:
+        if not _loaded.looked:
+            _loaded.looked = True
+            try:
+                from mjhill.callbacks.structs import offset, verify_fields
+
+                verify_fields()
+                nuser, rows = offset("mjModel.nuser_jnt"), offset("mjModel.actuator_dynprm")
+                _loaded.offsets = nuser, rows
+            except Exception as error:
+                _say(error)
+        return _loaded.offsets
+
+
+def _say(error: Exception) -> None:
+    print(f"mjhill: the muscle cannot run, its forces are not numbers: {error}", file=sys.stderr)
 
 
 def _functions() -> dict[str, Any] | None:
@@ -117,10 +160,7 @@ def _functions() -> dict[str, Any] | None:
             try:
                 _load()
             except Exception as error:
-                print(
-                    f"mjhill: the muscle cannot run, its forces are not numbers: {error}",
-                    file=sys.stderr,
-                )
+                _say(error)
         return _loaded.functions
 
 
@@ -135,18 +175,24 @@ def _load() -> None:
     _replace({name: getattr(code, name) for name in NAMES})
 
 
-def _put_guard(enough: int) -> None:
+def _put_guard(nuser_jnt: int, enough: int) -> None:
     """A passive callback in C for models without our elasticity, which calls the stub for others.
 
-    Python would cost each of their steps a microsecond and all threads their turns.
+    Python would cost each of their steps a microsecond and all threads their turns. Without a
+    compiler it stays at that.
+
+    Args:
+        nuser_jnt: Where that is in ``mjModel`` [bytes].
+        enough: The ``nuser_jnt`` of a model that may have our elasticity.
     """
-    import llvmlite.binding as llvm
-
-    from mjhill.callbacks.structs import offset
-
     with PROCESS.lock:
-        if len(PROCESS.automatic["passive"]) > 1:
-            return  # another thread has done it
+        if _loaded.guarded or len(PROCESS.automatic["passive"]) > 1:
+            return  # another thread has done it, or the machine code is there
+        _loaded.guarded = True
+        try:
+            import llvmlite.binding as llvm
+        except Exception:
+            return
         [stub] = PROCESS.automatic["passive"]
         passed_on = PROCESS.served["passive"].pointer or 0
         call = "call void inttoptr (i64 {} to ptr)(ptr %m, ptr %d)"
@@ -156,7 +202,7 @@ def _put_guard(enough: int) -> None:
             llvm.JITLibraryBuilder()
             .add_ir(
                 f"""define void @mjhill_guard(ptr %m, ptr %d) {{
-                  %p = getelementptr i8, ptr %m, i64 {offset("mjModel.nuser_jnt")}
+                  %p = getelementptr i8, ptr %m, i64 {nuser_jnt}
                   %n = load i64, ptr %p
                   %few = icmp slt i64 %n, {enough}
                   br i1 %few, label %pass, label %ask

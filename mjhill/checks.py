@@ -28,7 +28,9 @@ from mjhill.layout import (
 from mjhill.parameters import Muscle, quantities
 from mjhill.stability import Plant
 
-COARSE = 0.3  # stiffness, in units of what a timestep can hold, from which 5 % may be lost
+# stiffness, in units of what a timestep can hold: from where forces ring, and from where 5 % may
+# be lost; docs/numerics.md says how they were chosen
+RINGING, COARSE = 0.7, 0.3
 STEPS = 12  # timesteps a period below which a movement with little damping may be off by 5 %
 # custom numeric with the options that a model is made for: gravity, timestep, integrator
 MADE_FOR = "mjhill_made_for"
@@ -202,18 +204,19 @@ def _fast_joints(model: mujoco.MjModel, names: list[str]) -> Iterator[Finding]:
     remedy = f"set model.opt.timestep to {_rounded_down(enough):g} s or less"
     joints, found = joint_names(model), dict[int, Finding]()
     for mode in sorted(overloads, key=lambda mode: -mode.load):
-        muscles = ", ".join(repr(names[muscle]) for muscle in mode.muscles)
+        severe = mode.load >= RINGING
         effect = (
-            "so it is unstable there: forces change sign from step to step"
-            if mode.load >= 1
+            f"and from {RINGING:g} on forces ring from step to step, and above 1 ever more"
+            if severe
             else f"and from {COARSE:g} on results may be off by 5 %"
         )
+        muscles = ", ".join(repr(names[muscle]) for muscle in mode.muscles)
+        what = f"with its muscles at full force ({muscles}) its stiffness" if muscles else "damping"
         problem = (
-            f"with its muscles at full force ({muscles}) its stiffness is {mode.load:.2g} of what "
-            f"a timestep of {timestep:g} s can hold, {effect}"
+            f"{what} is {mode.load:.2g} of what a timestep of {timestep:g} s can hold, {effect}"
         )
         subject = f"joint {joints[mode.joint]!r}"
-        found.setdefault(mode.joint, Finding(subject, problem, remedy, mode.load >= 1, enough))
+        found.setdefault(mode.joint, Finding(subject, problem, remedy, severe, enough))
     for swing in swings:
         problem = (
             f"with its muscles at full force it swings with little damping and a period of "

@@ -6,8 +6,9 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from numbers import Real
-from types import MappingProxyType
 from typing import Any
+
+from mjhill.frozen import FrozenDict
 
 # units of a muscle on a hinge, and of one on a slide or tendon
 _FORCE, _LENGTH, _VELOCITY = ("N·m", "N"), ("rad", "m"), ("rad/s", "m/s")
@@ -77,7 +78,13 @@ def _check_quantities(parameters: Any) -> None:
 
 
 def _sources() -> Any:
-    return field(default_factory=lambda: MappingProxyType({}), compare=False, repr=False)
+    return field(default_factory=FrozenDict, compare=False, repr=False)
+
+
+def _freeze(parameters: Any, *names: str) -> None:
+    """Keep a copy of mappings that nobody can change, so that equal objects stay equal."""
+    for name in names:
+        object.__setattr__(parameters, name, FrozenDict(getattr(parameters, name)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,6 +183,7 @@ class Muscle:
                 f"electrical_stimulation must be False or True, got {self.electrical_stimulation!r}"
             )
         object.__setattr__(self, "electrical_stimulation", bool(self.electrical_stimulation))
+        _freeze(self, "sources")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -203,6 +211,7 @@ class Passive:
             ValueError: A parameter is not a finite number inside its bounds.
         """
         _check_quantities(self)
+        _freeze(self, "sources")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -236,7 +245,7 @@ class Joint:
     home_angle: float
     muscles: Mapping[str, Muscle]
     gears: Mapping[str, float]
-    postures: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    postures: Mapping[str, float] = field(default_factory=FrozenDict)
     sources: Mapping[str, str] = _sources()
 
     def __post_init__(self) -> None:
@@ -246,6 +255,8 @@ class Joint:
             ValueError: A parameter is not a finite number inside its bounds.
         """
         _check_quantities(self)
+        _freeze(self, "muscles", "gears", "postures", "sources")
+        object.__setattr__(self, "range", tuple(self.range))
         for what in ("gears", "postures"):
             names = set(getattr(self, what))
             if names != set(self.muscles) and (names or what == "gears"):

@@ -9,10 +9,70 @@ from typing import Self
 
 
 @dataclass(frozen=True)
+class _Constant:
+    level: float
+
+    def __call__(self, time: float) -> float:
+        return self.level
+
+
+@dataclass(frozen=True)
+class _Step:
+    level: float
+    start: float
+
+    def __call__(self, time: float) -> float:
+        return self.level if time >= self.start else 0.0
+
+
+@dataclass(frozen=True)
+class _Pulse:
+    level: float
+    start: float
+    end: float
+
+    def __call__(self, time: float) -> float:
+        return self.level if self.start <= time < self.end else 0.0
+
+
+@dataclass(frozen=True)
+class _Sinusoid:
+    amplitude: float
+    frequency: float
+    phase: float
+
+    def __call__(self, time: float) -> float:
+        return self.amplitude * math.sin(2 * math.pi * self.frequency * time + self.phase)
+
+
+@dataclass(frozen=True)
+class _Sum:
+    parts: tuple[Callable[[float], float], ...]  # flat, so that a long train is not deeply nested
+
+    def __call__(self, time: float) -> float:
+        first, *others = self.parts
+        total = first(time)
+        for part in others:
+            total += part(time)
+        return total
+
+
+@dataclass(frozen=True)
+class _Multiple:
+    factor: float
+    value: Callable[[float], float]
+
+    def __call__(self, time: float) -> float:
+        return self.factor * self.value(time)
+
+
+@dataclass(frozen=True)
 class Signal:
     """A scalar input that knows where it jumps.
 
-    The reference solver restarts at ``breaks``, so a jump is never stepped over.
+    The reference solver restarts at ``breaks``, so a jump is never stepped over. Signals made by
+    the functions of this module, their sums and multiples can be compared, hashed, copied and
+    pickled; one made of a function of yours as far as that function can.
 
     Attributes:
         value: The input as a function of time [s].
@@ -22,6 +82,10 @@ class Signal:
     value: Callable[[float], float]
     breaks: tuple[float, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Keep the breaks as a tuple."""
+        object.__setattr__(self, "breaks", tuple(self.breaks))
+
     def __call__(self, time: float) -> float:
         """The value at ``time`` [s]; at a jump, the value after it."""
         return self.value(time)
@@ -30,13 +94,14 @@ class Signal:
         """The sum of two signals, or of a signal and a constant."""
         second = as_signal(other)
         breaks = tuple(sorted({*self.breaks, *second.breaks}))
-        return Signal(lambda t: self.value(t) + second.value(t), breaks)
+        parts = self.value.parts if isinstance(self.value, _Sum) else (self.value,)
+        return Signal(_Sum((*parts, second.value)), breaks)
 
     __radd__ = __add__
 
     def __mul__(self, factor: float) -> Signal:
         """The signal scaled by a constant."""
-        return Signal(lambda t: factor * self.value(t), self.breaks)
+        return Signal(_Multiple(factor, self.value), self.breaks)
 
     __rmul__ = __mul__
 
@@ -44,14 +109,14 @@ class Signal:
 def constant(level: float) -> Signal:
     """The same ``level`` at all times."""
     _check_finite("level", level)
-    return Signal(lambda t: level)
+    return Signal(_Constant(level))
 
 
 def step(level: float, start: float = 0.0) -> Signal:
     """0 before ``start`` [s], ``level`` from then on."""
     _check_finite("level", level)
     _check_finite("start", start)
-    return Signal(lambda t: level if t >= start else 0.0, (start,))
+    return Signal(_Step(level, start), (start,))
 
 
 def pulse(level: float, start: float, width: float) -> Signal:
@@ -64,7 +129,7 @@ def pulse(level: float, start: float, width: float) -> Signal:
     _check_finite("start", start)
     _check_positive("width", width)
     end = start + width
-    return Signal(lambda t: level if start <= t < end else 0.0, (start, end))
+    return Signal(_Pulse(level, start, end), (start, end))
 
 
 def sinusoid(amplitude: float, frequency: float, phase: float = 0.0) -> Signal:
@@ -76,7 +141,7 @@ def sinusoid(amplitude: float, frequency: float, phase: float = 0.0) -> Signal:
     _check_finite("amplitude", amplitude)
     _check_finite("phase", phase)
     _check_positive("frequency", frequency)
-    return Signal(lambda t: amplitude * math.sin(2 * math.pi * frequency * t + phase))
+    return Signal(_Sinusoid(amplitude, frequency, phase))
 
 
 def as_signal(value: Signal | float) -> Signal:

@@ -74,6 +74,8 @@ class Plant:
         arms: Change of each muscle's length with y, shape (nmuscle, n).
         slopes: Stiffness of each series element, shape (nmuscle,).
         relaxation: Rate [1/s] at which each contractile element takes up a stretch.
+        braking: Under RK4, the fastest rate [1/s] at which damping stops a movement, those that
+            constraints hold back included, and its joint: RK4 sees the damping there too.
     """
 
     staged: bool
@@ -86,6 +88,7 @@ class Plant:
     arms: _Values
     slopes: _Values
     relaxation: _Values
+    braking: tuple[float, int] = (0.0, 0)
 
     @staticmethod
     def parts(model: mujoco.MjModel) -> list[Plant]:
@@ -133,21 +136,25 @@ class Plant:
         elasticity = _elasticity(model, np.abs(arms * force[:, None]).max(axis=0))
         damping = np.asarray(model.dof_damping, dtype=np.float64).reshape(model.nv, -1)[:, 0]
         viscosity, elastic = np.diag(damping), np.diag(elasticity)
+        staged, braking = model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4), (0.0, 0)
         if data.ne:
+            braking = _braking(mass, damping, model.dof_jntid) if staged else braking
             mass, viscosity, elastic = (free.T @ m @ free for m in (mass, viscosity, elastic))
             arms = arms @ free
         return Plant(
-            model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4), model.dof_jntid.copy(),
-            tuple(muscles), free, mass, viscosity, elastic, arms, force * slope, yielding * slope,
+            staged, model.dof_jntid.copy(), tuple(muscles), free, mass, viscosity, elastic, arms,
+            force * slope, yielding * slope, braking,
         )  # fmt: skip
 
     def overloads(self, timestep: float, limit: float) -> list[Mode]:
         """Movements whose load is ``limit`` or more at a timestep [s], the heaviest first."""
         stiffness, held = self._pencil(timestep)
+        brake = Mode(timestep * self.braking[0] / _STAGED_RATE, self.braking[1], ())
+        braked = [brake] if brake.load >= limit else []
         if _is_positive(limit * held - stiffness):
-            return []
+            return braked
         loads, modes = self._modes(timestep)
-        return [
+        return braked + [
             Mode(float(loads[k]), self._joint(modes[:, k]), self._stiffest(modes[:, k], timestep))
             for k in np.argsort(-loads)
             if loads[k] >= limit
@@ -156,7 +163,7 @@ class Plant:
     def load(self, timestep: float) -> float:
         """The load of the heaviest movement."""
         loads, _ = self._modes(timestep)
-        return float(loads.max())
+        return max(float(loads.max()), timestep * self.braking[0] / _STAGED_RATE)
 
     def swings(self, fastest: float) -> list[Swing]:
         """Movements with little damping, of a natural frequency [rad/s] of ``fastest`` or more."""
@@ -225,6 +232,14 @@ class Plant:
         shares = self.slopes * weights * (self.arms @ mode) ** 2
         order = np.argsort(-shares)[:3]
         return tuple(self.muscles[k] for k in order if shares[k] >= 0.3 * shares.max())
+
+
+def _braking(mass: _Values, damping: _Values, joints: NDArray[np.int32]) -> tuple[float, int]:
+    """The fastest rate [1/s] at which damping stops a movement, and the joint that moves most."""
+    inverse = np.linalg.inv(np.linalg.cholesky(mass))
+    rates, modes = np.linalg.eigh(inverse @ (damping[:, None] * inverse.T))
+    moved = (inverse.T @ modes[:, -1]) ** 2 * damping
+    return float(rates[-1]), int(joints[np.argmax(moved)])
 
 
 def _connected(trees: NDArray[np.int32], arms: _Values) -> NDArray[np.int32]:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
+from mjhill.frozen import FrozenDict
 from mjhill.parameters import Joint, Muscle, Passive
 
 
@@ -63,7 +63,7 @@ class System:
     name: str
     coordinates: Mapping[str, Coordinate]
     muscles: Mapping[str, Muscle]
-    arms: Mapping[str, Mapping[str, float]] = field(default_factory=lambda: MappingProxyType({}))
+    arms: Mapping[str, Mapping[str, float]] = field(default_factory=FrozenDict)
 
     def __post_init__(self) -> None:
         """Check the names.
@@ -71,6 +71,13 @@ class System:
         Raises:
             ValueError: A muscle has no arm, or one about an unknown coordinate.
         """
+        frozen = {
+            "coordinates": FrozenDict(self.coordinates),
+            "muscles": FrozenDict(self.muscles),
+            "arms": FrozenDict({name: FrozenDict(arms) for name, arms in self.arms.items()}),
+        }
+        for what, mapping in frozen.items():
+            object.__setattr__(self, what, mapping)
         if set(self.arms) != set(self.muscles):
             raise ValueError(
                 f"arms must name the muscles {sorted(self.muscles)}, got {sorted(self.arms)}"

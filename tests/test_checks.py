@@ -76,7 +76,7 @@ def test_a_timestep_that_is_not_positive_is_refused(pair, timestep):
 
 def test_a_timestep_past_the_stability_of_the_series_element_warns(pair):
     pair.opt.timestep = 0.05
-    with pytest.warns(RuntimeWarning, match="joint 'elbow': with its muscles .* it is unstable"):
+    with pytest.warns(RuntimeWarning, match="joint 'elbow': with its muscles .* forces ring"):
         mjhill.check_model(pair)
 
 
@@ -192,6 +192,19 @@ def test_joints_that_a_constraint_holds_together_have_their_inertia_together():
     assert len(together.mass) == 1
     # twice the stiffness on a thousand times the inertia, and viscosity holds some of it
     assert together.load(1e-3) < alone / 50
+
+
+def test_rk4_sees_damping_where_a_constraint_allows_no_movement():
+    spec = arms(1)
+    constraint = spec.add_equality(name1="joint0")
+    constraint.type = mujoco.mjtEq.mjEQ_JOINT
+    other = spec.worldbody.add_body(mass=1, inertia=[0.06] * 3, explicitinertial=True)
+    other.add_joint(name="other", type=mujoco.mjtJoint.mjJNT_HINGE)
+    spec.bodies[1].joints[0].damping = [200, 0, 0]
+    model = spec.compile()
+    assert mjhill.check_model(model) == ()
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    found(model, "joint 'joint0': damping is 1.2 of what a timestep of 0.001 s can hold")
 
 
 def test_the_cost_of_the_checks_grows_with_the_muscles_not_with_their_square():

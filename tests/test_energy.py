@@ -2,179 +2,25 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+import contextlib
+import copy
+import io
+import pickle
+import re
+from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 from conftest import rest
-from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 import mjhill
-from mjhill.readings import tension
+from mjhill.bench import balance
+from mjhill.readings import isometric_share, passive_energy, series_energy, tension
 from mjhill.reference import plant_torque
 from mjhill.spec import joint_spec
-
-_Values = NDArray[np.float64]
-_GAUSS = ((-np.sqrt(0.6), 5 / 18), (0.0, 8 / 18), (np.sqrt(0.6), 5 / 18))  # nodes and weights
-
-
-@dataclass(frozen=True)
-class Energy:
-    """Work and stored energy of a joint and its muscles since the start of a recording [J].
-
-    Attributes:
-        time: When [s].
-        contractile: Work of each muscle's contractile element.
-        series: Energy gained by each muscle's series element.
-        delivered: Work of each muscle on the joint.
-        kinetic: Energy of motion gained.
-        elastic: Energy gained by the passive elasticity.
-        viscous: Loss in the passive viscosity.
-        external: Work of the external torque on the joint.
-    """
-
-    time: _Values
-    contractile: Mapping[str, _Values]
-    series: Mapping[str, _Values]
-    delivered: Mapping[str, _Values]
-    kinetic: _Values
-    elastic: _Values
-    viscous: _Values
-    external: _Values
-
-    @property
-    def gap(self) -> float:
-        """Most that is missing or too much between work and energy, in units of the largest."""
-        given = [*self.contractile.values(), self.external]
-        spent = [*self.series.values(), self.kinetic, self.elastic, self.viscous]
-        return _most([np.sum(given, axis=0) - np.sum(spent, axis=0)]) / _most([*given, *spent])
-
-    @property
-    def muscle_gap(self) -> float:
-        """As ``gap``, of the muscles alone."""
-        gaps = [
-            self.contractile[name] - self.series[name] - self.delivered[name]
-            for name in self.series
-        ]
-        return _most(gaps) / _most([*self.contractile.values(), self.external])
-
-
-def energy(recording: mjhill.Recording, joint: mjhill.Joint) -> Energy:
-    """Work and energy of a recording of ``joint_spec(joint)``, or of a model that moves alike.
-
-    Work is mean force times displacement. MuJoCo's single-step integrators are semi-implicit:
-    the new velocity moves the joint, q[k+1] = q[k] + h v[k+1]. So a recorded velocity is the
-    mean over the step before its sample, the velocity at sample k is (v[k] + v[k+1])/2, and
-    there is none at the last sample, which is left out. The force of sample k acts from
-    half a step before it to half a step after it, so over a step acts the mean of the forces at
-    its two ends. RK4's velocity is that of the sample itself, and an input is held from one
-    sample to the next.
-
-    Raises:
-        ValueError: The recording does not have every step.
-    """
-    time, name = recording.time, joint.name
-    if not np.allclose(np.diff(time), recording.about["timestep"]):
-        raise ValueError("energy needs a recording of every step")
-    fine = recording.about["integrator"] == "mjINT_RK4"
-    angle, velocity = recording[f"{name}.angle"], recording[f"{name}.velocity"]
-    applied = recording.series.get(f"{name}.applied", np.zeros(len(time)))
-    pieces = _pieces(applied) if fine else []
-    if not fine:
-        velocity = np.append(0.5 * (velocity[:-1] + velocity[1:]), np.nan)
-    contractile, series, delivered = {}, {}, {}
-    for each, muscle in joint.muscles.items():
-        force = recording[f"{each}.force"]
-        shortened = _summed(recording[f"{each}.velocity"][1:] * np.diff(time))
-        contractile[each] = _work(time, force, shortened, pieces)
-        series[each] = _gained(series_energy(muscle, recording[f"{each}.stretch"]))
-        delivered[each] = _work(time, -joint.gears[each] * force, angle, pieces)
-    held = applied[:-1] if fine else 0.5 * (applied[:-1] + applied[1:])
-    last = None if fine else -1
-    return Energy(
-        time[:last],
-        {each: values[:last] for each, values in contractile.items()},
-        {each: values[:last] for each, values in series.items()},
-        {each: values[:last] for each, values in delivered.items()},
-        _gained(0.5 * joint.inertia * velocity**2)[:last],
-        _gained(elastic_energy(joint, angle))[:last],
-        _work(time, joint.damping * velocity, angle, pieces)[:last],
-        _summed(held * np.diff(angle))[:last],
-    )
-
-
-def series_energy(muscle: mjhill.Muscle, stretch: _Values) -> _Values:
-    """Energy of the series element at a stretch [J]: the integral of its force."""
-    taut = np.maximum(stretch, 0.0)
-    rate = muscle.series_shape / muscle.series_stretch
-    grown: _Values = _area(rate * taut, muscle.series_shape * muscle.series_limit) / rate
-    scale = muscle.max_isometric_force / float(np.expm1(muscle.series_shape))
-    return scale * (grown - taut)
-
-
-def elastic_energy(joint: mjhill.Joint, angle: _Values) -> _Values:
-    """Energy of the passive elasticity of a joint at an angle [J]: the integral of its torque."""
-    deviation, passive = angle - joint.rest_angle, joint.passive
-    stored: _Values = 0.5 * joint.stiffness * deviation**2
-    for k1, k2, sign in (
-        (passive.k1_pos, passive.k2_pos, 1.0),
-        (passive.k1_neg, passive.k2_neg, -1.0),
-    ):
-        beyond = np.maximum(sign * deviation, 0.0)
-        stored += k1 * (_area(k2 * beyond, passive.exponent_limit) / k2 - beyond)
-    return stored
-
-
-def _area(z: _Values, limit: float) -> _Values:
-    """Integral from 0 to z of exp(z), which goes on straight past the limit."""
-    past = np.maximum(z - limit, 0.0)
-    area: _Values = np.expm1(np.minimum(z, limit)) + np.exp(limit) * (past + 0.5 * past**2)
-    return area
-
-
-def _work(time: _Values, force: _Values, way: _Values, pieces: list[slice]) -> _Values:
-    """Work of a force along a way, up to each sample.
-
-    By the mean of force at the ends of a step, which is of second order as the single-step
-    integrators are at best. RK4 is of fourth order, so there force and way are splines over each
-    of the pieces in which they are smooth.
-    """
-    if not pieces:
-        return _summed(0.5 * (force[:-1] + force[1:]) * np.diff(way))
-    done = []
-    for piece in pieces:
-        pull = CubicSpline(time[piece], force[piece])
-        rate = CubicSpline(time[piece], way[piece]).derivative()
-        half = 0.5 * np.diff(time[piece])
-        middle = time[piece][:-1] + half
-        nodes = [(middle + half * node, weight) for node, weight in _GAUSS]
-        done.append(2 * half * sum(weight * pull(at) * rate(at) for at, weight in nodes))
-    return _summed(np.concatenate(done))
-
-
-def _pieces(applied: _Values) -> list[slice]:
-    """Samples from one jump of the torque to the next, both included."""
-    jumps = (np.flatnonzero(np.diff(applied)) + 1).tolist()
-    edges = sorted({0, *jumps, len(applied) - 1})
-    return [slice(begin, end + 1) for begin, end in itertools.pairwise(edges)]
-
-
-def _summed(changes: _Values) -> _Values:
-    return np.concatenate(([0.0], np.cumsum(changes)))
-
-
-def _gained(values: _Values) -> _Values:
-    return values - values[0]
-
-
-def _most(values: list[_Values]) -> float:
-    return max(float(np.abs(each).max()) for each in values)
-
 
 SYSTEMS = ("elbow", "wrist", "knee", "ankle", "eye", 0, 1, 2, 3)  # numbers: variants of the elbow
 
@@ -244,14 +90,18 @@ def gap(system: str | int, integrator: str, timestep: float, heavier: bool = Fal
     step later than the force, as if half a step of viscosity were added to the inertia.
     """
     joint = joint_of(system)
-    if heavier:
-        joint = replace(joint, inertia=joint.inertia + 0.5 * timestep * joint.damping)
-    return max(energy(run, joint).gap for run in recorded(system, integrator, timestep))
+    added = 0.5 * timestep * joint.damping if heavier else 0.0
+    gaps = []
+    for run in recorded(system, integrator, timestep):
+        balance = mjhill.energy(run)
+        square = balance.kinetic * 2 / joint.inertia
+        lacking = np.abs(balance.residual - 0.5 * added * square).max()
+        gaps.append(balance.gap * lacking / np.abs(balance.residual).max())
+    return max(gaps)
 
 
 def muscle_gap(system: str | int, integrator: str, timestep: float) -> float:
-    joint = joint_of(system)
-    return max(energy(run, joint).muscle_gap for run in recorded(system, integrator, timestep))
+    return max(mjhill.energy(run).muscle_gap for run in recorded(system, integrator, timestep))
 
 
 @pytest.mark.parametrize("end", [-0.02, 0.2, 1.5])
@@ -263,12 +113,13 @@ def test_series_energy_is_the_work_that_stretches_the_element(muscle, end):
 
 
 @pytest.mark.parametrize("end", [-1.1, 0.9, -6.0, 5.0])
-def test_elastic_energy_is_the_work_that_bends_the_joint(elbow, end):
-    joint = replace(elbow, passive=replace(elbow.passive, exponent_limit=2.0))
-    angle = joint.rest_angle + np.linspace(0.0, end, 20001)
-    torque = [plant_torque(joint, each) for each in angle.tolist()]
-    expected = -np.trapezoid(torque, angle)
-    assert elastic_energy(joint, angle)[-1] == pytest.approx(expected, rel=1e-6)
+def test_passive_energy_is_the_work_that_bends_the_joint(elbow, end):
+    passive = replace(elbow.passive, exponent_limit=2.0)
+    joint = replace(elbow, passive=passive, stiffness=0.0)
+    deviation = np.linspace(0.0, end, 20001)
+    torque = [plant_torque(joint, joint.rest_angle + each) for each in deviation.tolist()]
+    expected = -np.trapezoid(torque, deviation)
+    assert passive_energy(passive, deviation)[-1] == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
@@ -305,8 +156,238 @@ def test_under_rk4_power_closes_to_a_millionth_at_a_quarter_of_a_millisecond(sys
     assert fine < 1e-6
 
 
-def test_energy_needs_every_step(pair, elbow):
+def test_energy_needs_every_step(pair):
     with mjhill.installed():
         run = mjhill.record(pair, rest(pair), duration=0.1, every=2)
     with pytest.raises(ValueError, match="energy needs a recording of every step"):
-        energy(run, elbow)
+        mjhill.energy(run)
+
+
+# a slide that holds an arm of hinge, hinge and ball, with a muscle over all of them
+LIMB = """
+<mujoco>
+  <option timestep="{timestep}" integrator="{integrator}" density="{density}"/>
+  <default><geom contype="0" conaffinity="0"/></default>
+  <worldbody>
+    <site name="origin" pos="0.03 0 0.3"/>
+    <body><joint name="shift" type="slide" axis="1 0 0" damping="20" stiffness="100"/>
+      <joint name="shoulder" axis="0 1 0" damping="0.2" stiffness="1 0.5 0.7" springref="20"/>
+      <geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.3" mass="1"/>
+      <body pos="0 0 -0.3" gravcomp="{gravcomp}">
+        <joint name="elbow" axis="0 1 0" damping="0.1 0.05"/>
+        <geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.25" mass="0.7"/>
+        <site name="insertion" pos="0.02 0 -0.1"/>
+        <body name="hand" pos="0 0 -0.25"><joint name="wrist" type="ball" damping="0.02"
+          stiffness="{ball}"/>
+          <geom type="box" size="0.02 0.04 0.05" pos="0.01 0 -0.05" mass="0.3"/>
+        </body></body></body>
+  </worldbody>
+  <tendon><spatial name="tendon" stiffness="{spring}" damping="{damper}">
+    <site site="origin"/><site site="insertion"/></spatial></tendon>
+  <equality>{equality}</equality>
+</mujoco>"""
+PLAIN = {
+    "density": 0, "gravcomp": 0, "ball": 0, "spring": 0, "damper": 0, "equality": "",
+    "motor": False, "push": False, "torque": {},
+}  # fmt: skip
+LIMBS = {
+    "gravity": {},
+    "gravity compensated": {"gravcomp": 0.5},
+    "springs": {"ball": 2, "spring": 50, "damper": 3},
+    "fluid": {"density": 1000},
+    "motor": {"motor": True},
+    "push": {"push": True},
+    "torque": {"torque": {"elbow": mjhill.pulse(2, 0.1, 0.1), "shift": mjhill.step(3, 0.1)}},
+    "constraint": {"equality": '<joint joint1="elbow" polycoef="0.5 0 0 0 0"/>'},
+}
+
+
+def limb(integrator: str, timestep: float, changes: dict) -> mjhill.Recording:
+    """A movement of the limb with some of its parts."""
+    parts = {**PLAIN, **changes}
+    spec = mujoco.MjSpec.from_string(LIMB.format(integrator=integrator, timestep=timestep, **parts))
+    puller = mjhill.Muscle(
+        max_isometric_force=300, optimal_length=0, width_short=0.1, width_long=0.1,
+        max_velocity=0.8, hill_shape=0.3, series_stretch=0.02, excitation_tau=0.03,
+        activation_tau=0.01, deactivation_tau=0.04, velocity_activation=0.3,
+    )  # fmt: skip
+    mjhill.add_muscle(spec, name="puller", muscle=puller, tendon="tendon")
+    passive = mjhill.Passive(k1_pos=0.1, k2_pos=3, k1_neg=0.1, k2_neg=3)
+    mjhill.add_passive(spec, joint="elbow", passive=passive)
+    excitation = {"puller": mjhill.step(0.5, 0.05)}
+    if parts["motor"]:
+        motor = spec.add_actuator(name="motor", target="elbow", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        motor.set_to_motor()
+        excitation["motor"] = mjhill.sinusoid(1.0, 2.0)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.qpos[:3] = 0.01, 0.3, 0.5
+    data.qpos[3:7] = 0.9, 0.3, 0.1, 0.3
+    mujoco.mj_normalizeQuat(model, data.qpos)
+    if parts["push"]:
+        data.xfrc_applied[model.body("hand").id] = 1, 2, 0, 0.1, 0, 0
+    mjhill.equilibrate(model, data)
+    with mjhill.installed():
+        return mjhill.record(
+            model, data, duration=0.4, excitation=excitation, torque=parts["torque"]
+        )
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+@pytest.mark.parametrize("changes", LIMBS.values(), ids=LIMBS)
+def test_power_of_a_limb_closes_with_whatever_acts_on_it(changes, integrator):
+    coarse, fine = (mjhill.energy(limb(integrator, h, changes)).gap for h in (1e-3, 5e-4))
+    assert coarse < 4e-3
+    assert fine < 0.55 * coarse  # first order
+
+
+@pytest.mark.parametrize("what", ["gravity", "gravity compensated", "springs", "fluid", "push"])
+def test_power_of_a_limb_closes_to_a_millionth_under_rk4(what):
+    coarse, fine = (mjhill.energy(limb("RK4", h, LIMBS[what])).gap for h in (1e-3, 5e-4))
+    assert coarse < 1e-6
+    assert fine < 0.2 * coarse  # third order at least
+
+
+def test_every_term_of_a_limb_matters():
+    changes = {key: value for part in LIMBS.values() for key, value in part.items()}
+    found = mjhill.energy(limb("implicitfast", 1e-3, changes))
+    assert found.gap < 0.01
+    terms = [
+        *found.contractile.values(), *found.series.values(), sum(found.elastic.values()),
+        found.kinetic, found.gravity, found.springs, found.damping, found.external,
+        found.constraint, found.other,
+    ]  # fmt: skip
+    assert set(found.elastic) == {"shift", "shoulder", "elbow"}
+    for term in terms:
+        assert np.abs(term).max() > 2 * np.abs(found.residual).max()
+
+
+def test_the_energy_of_a_spring_that_stiffens_is_what_mujoco_has():
+    run = limb("implicitfast", 1e-3, {})
+    bend = run["shoulder.angle"] - np.radians(20)
+    stored = 0.5 * bend**2 + 0.5 * bend**3 / 3 + 0.7 * bend**4 / 4
+    np.testing.assert_allclose(run["shoulder.passive_energy"], stored, rtol=1e-12)
+    model = mujoco.MjModel.from_xml_string("""<mujoco><option gravity="0 0 0"/><worldbody><body>
+      <joint axis="0 1 0" stiffness="1 0.5 0.7" springref="20"/><geom size="0.1"/></body>
+      </worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    data.qpos[0] = run["shoulder.angle"][-1]
+    mujoco.mj_forward(model, data)
+    mujoco.mj_energyPos(model, data)
+    assert stored[-1] == pytest.approx(data.energy[0], rel=1e-12)
+
+
+def test_work_that_a_forcerange_withholds_is_a_term(elbow):
+    spec = joint_spec(elbow)
+    actuator = spec.actuator("elbow_flexor")
+    actuator.forcerange, actuator.forcelimited = [-5, 0], mujoco.mjtLimited.mjLIMITED_TRUE
+    model = spec.compile()
+    excitation = {"elbow_flexor": mjhill.step(1.0, 0.02)}
+    with mjhill.installed(), pytest.warns(RuntimeWarning, match="its forcerange"):
+        run = mjhill.record(model, rest(model), duration=0.4, excitation=excitation)
+    found = mjhill.energy(run)
+    assert found.withheld["elbow_flexor"][-1] > 0.1 * found.contractile["elbow_flexor"][-1] > 0.1
+    assert not found.withheld["elbow_extensor"].any()
+    assert found.gap < 3e-3
+    assert found.muscle_gap < 3e-4
+
+
+def test_loss_to_viscosity_is_the_work_that_a_muscle_without_it_would_give_more(elbow):
+    """At a prescribed force-velocity point both follow from Hill's relation."""
+    muscle = replace(elbow.muscles["elbow_flexor"], viscosity=0.2)
+    joint = replace(elbow, muscles={**elbow.muscles, "elbow_flexor": muscle})
+    model = joint_spec(joint).compile()
+    model.opt.timestep = 2.5e-4
+    with mjhill.installed():
+        run = mjhill.record(
+            model, rest(model), duration=0.3, excitation={"elbow_flexor": mjhill.step(1.0, 0.02)}
+        )
+    name = "elbow_flexor"
+    found = mjhill.energy(run)
+    velocity, a = run[f"{name}.velocity"], run[f"{name}.a"]
+    active = [isometric_share(muscle, *pair) for pair in zip(a, run[f"{name}.length"], strict=True)]
+    active = np.maximum(active, 0)
+    scale = 1 - muscle.velocity_activation + muscle.velocity_activation * active
+    w = velocity / muscle.max_velocity / scale
+    without = muscle.max_isometric_force * active * muscle.hill_shape * (1 - w)
+    without /= muscle.hill_shape + w
+    shortening = (w > 0.02) & (run.time > 0.1)
+    power = np.diff(found.viscosity[name]) / np.diff(run.time)
+    expected = (without - run[f"{name}.force"]) * velocity
+    np.testing.assert_allclose(power[shortening[1:]], expected[1:][shortening[1:]], rtol=0.05)
+    assert shortening.sum() > 50
+
+
+def test_a_balance_prints_its_terms_and_can_be_copied(pair):
+    with mjhill.installed():
+        run = mjhill.record(pair, rest(pair), duration=0.1, excitation={"elbow_flexor": 0.5})
+    found = mjhill.energy(run)
+    for other in (copy.deepcopy(found), pickle.loads(pickle.dumps(found))):
+        assert str(other) == str(found)
+    lines = str(found).splitlines()
+    assert lines[0] == "energy balance of 0.1 s [J]"
+    end = found.at_end()
+    assert end["lost to damping"] == found.damping[-1]
+    assert f"{end['lost to damping']:.6f}" in str(found)
+    assert lines[-1].startswith("largest residual: 0.")
+    assert "constraint" not in str(found)  # there are none
+    with pytest.raises(TypeError, match="cannot be changed"):
+        found.series["elbow_flexor"] = 0
+
+
+def test_a_saved_recording_has_the_same_balance(pair, tmp_path):
+    with mjhill.installed():
+        run = mjhill.record(pair, rest(pair), duration=0.1, excitation={"elbow_flexor": 0.5})
+    for suffix in (".csv", ".npz"):
+        loaded = mjhill.Recording.load(run.save(tmp_path / f"run{suffix}"))
+        assert str(mjhill.energy(loaded)) == str(mjhill.energy(run))
+
+
+def test_a_recording_that_is_none_of_record_has_no_balance(elbow):
+    exact = mjhill.reference.simulate(elbow, {}, duration=0.01)
+    with pytest.raises(ValueError, match="needs a recording that mjhill.record made"):
+        mjhill.energy(exact)
+
+
+PAGE = (Path(__file__).parent.parent / "docs" / "energy.md").read_text(encoding="utf-8")
+NUMBER = r"-?\d+\.\d+"
+
+
+def test_the_program_of_the_page_prints_what_the_page_says():
+    (program,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    assert len([line for line in program.splitlines() if line]) <= 10
+    (text,) = re.findall(r"```text\n(.*?)```", PAGE, re.DOTALL)
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(program, {})
+    said, found = text.splitlines(), printed.getvalue().splitlines()
+    assert [re.sub(NUMBER, "", line).split() for line in said] == [
+        re.sub(NUMBER, "", line).split() for line in found
+    ]
+    for one, other in zip(said, found, strict=True):
+        assert list(map(float, re.findall(NUMBER, one))) == pytest.approx(
+            list(map(float, re.findall(NUMBER, other))), rel=1e-3, abs=2e-6
+        )
+
+
+def test_the_table_of_residuals_is_what_is_measured():
+    (table,) = re.findall(r"<!-- balance.*?-->\n(.*?)<!-- end -->", PAGE, re.DOTALL)
+    _, _, *written = table.splitlines()
+    for line, (joint, pairs) in zip(written, balance.rows(), strict=True):
+        name, *cells = (cell.strip() for cell in line.strip("|").split("|"))
+        assert name == joint
+        for cell, pair in zip(cells, pairs, strict=True):
+            # two digits; the smallest under RK4 hang on the last bits of exp
+            assert list(map(float, cell.split(" / "))) == pytest.approx(pair, rel=0.1, abs=2e-5)
+
+
+def test_the_page_lists_every_series_of_muscles_and_models(elbow):
+    changes = {key: value for part in LIMBS.values() for key, value in part.items()}
+    run = limb("implicitfast", 1e-3, changes)
+    quantities = {name.partition(".")[2] for name in run if name.startswith("puller.")}
+    quantities = {re.sub("^arm_.*", "arm_<joint>", quantity) for quantity in quantities}
+    whole = {name for name in run if name.startswith("model.")}
+    rows = [row for row in PAGE.splitlines() if row.startswith("| `")]
+    listed = {name for row in rows for name in re.findall(r"`([^`]+)`", row.split("|")[1])}
+    assert listed >= quantities | whole
+    assert listed - quantities - whole == {"tension", "force", "velocity", "push"} - quantities

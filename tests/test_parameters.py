@@ -1,9 +1,16 @@
+import copy
 import dataclasses
+import json
+import multiprocessing
+import operator
+import pickle
+from types import MappingProxyType
 
 import pytest
 
 import mjhill
 from mjhill.parameters import quantities
+from mjhill.system import System
 
 
 @pytest.mark.parametrize(
@@ -59,3 +66,90 @@ def test_time_constants_lie_in_the_ranges_of_equation_12(name):
         assert 0.005 <= muscle.activation_tau <= 0.015
         assert 0.020 <= muscle.deactivation_tau <= 0.060
         assert muscle.eccentric_plateau == 1.3
+
+
+def parameter_objects():
+    elbow = mjhill.JOINTS["elbow"]
+    return {
+        "joint": elbow,
+        "muscle": elbow.muscles["elbow_flexor"],
+        "passive": elbow.passive,
+        "system": System.of(elbow),
+    }
+
+
+@pytest.mark.parametrize("kind", ["joint", "muscle", "passive", "system"])
+@pytest.mark.parametrize("protocol", [*range(pickle.HIGHEST_PROTOCOL + 1), "copy", "deepcopy"])
+def test_a_copy_of_parameters_is_equal_with_equal_hash_and_sources(kind, protocol):
+    original = parameter_objects()[kind]
+    if isinstance(protocol, int):
+        copied = pickle.loads(pickle.dumps(original, protocol))
+    else:
+        copied = getattr(copy, protocol)(original)
+    assert copied == original
+    assert hash(copied) == hash(original)
+    assert getattr(copied, "sources", None) == getattr(original, "sources", None)
+    assert type(copied) is type(original)
+
+
+@pytest.mark.parametrize("kind", ["joint", "muscle", "passive", "system"])
+def test_parameters_as_a_dict_are_plain_and_go_through_json(kind):
+    original = parameter_objects()[kind]
+    values = dataclasses.asdict(original)
+    assert json.loads(json.dumps(values)).keys() == values.keys()
+    if kind in ("muscle", "passive"):
+        assert type(original)(**values) == original
+    if kind == "joint":
+        assert values["muscles"]["elbow_flexor"] == dataclasses.asdict(
+            original.muscles["elbow_flexor"]
+        )
+
+
+def test_joints_that_are_equal_hash_equal_however_they_were_made(elbow):
+    backwards = dict(reversed(elbow.muscles.items()))
+    other = dataclasses.replace(
+        elbow, muscles=MappingProxyType(backwards), gears=dict(elbow.gears), range=[*elbow.range]
+    )
+    assert other == elbow
+    assert len({other, elbow}) == 1
+    assert dataclasses.replace(elbow, inertia=2 * elbow.inertia) not in {elbow}
+
+
+def test_a_joint_in_another_process_is_the_same(elbow):
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        total = pool.apply(_total_force, (elbow, mjhill.step(0.5, 0.1)))
+    assert total == 0.5 * sum(m.max_isometric_force for m in elbow.muscles.values())
+
+
+def _total_force(joint, signal):
+    return signal(0.2) * sum(muscle.max_isometric_force for muscle in joint.muscles.values())
+
+
+CHANGES = {
+    "set": lambda mapping: operator.setitem(mapping, "elbow_flexor", 1.0),
+    "delete": lambda mapping: operator.delitem(mapping, "elbow_flexor"),
+    "update": lambda mapping: mapping.update(elbow_flexor=1.0),
+    "or": lambda mapping: operator.ior(mapping, {"elbow_flexor": 1.0}),
+    "pop": lambda mapping: mapping.pop("elbow_flexor"),
+    "popitem": lambda mapping: mapping.popitem(),
+    "setdefault": lambda mapping: mapping.setdefault("x", 1.0),
+    "clear": lambda mapping: mapping.clear(),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+@pytest.mark.parametrize("copied", [lambda joint: joint, copy.copy, copy.deepcopy])
+def test_mappings_of_a_joint_cannot_be_changed(elbow, change, copied):
+    joint = copied(elbow)
+    before = dict(joint.gears)
+    for mapping in (joint.gears, joint.muscles, joint.sources, joint.postures):
+        with pytest.raises(TypeError, match="this mapping cannot be changed; make a new one"):
+            change(mapping)
+    assert joint.gears == before
+
+
+def test_a_joint_keeps_its_own_copy_of_the_mappings_it_is_given(elbow):
+    gears = dict(elbow.gears)
+    joint = dataclasses.replace(elbow, gears=gears)
+    gears["elbow_flexor"] = 7.0
+    assert joint.gears == elbow.gears

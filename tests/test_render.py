@@ -13,7 +13,7 @@ import pytest
 
 from mjhill.recording import Recording
 from mjhill.rendering import View, render, snapshot
-from mjhill.rendering.bellies import activation_colour, drawn_muscles, muscle_shapes
+from mjhill.rendering.bellies import activation_colour, drawn_muscles, muscle_shapes, present_look
 
 ELBOW = Path(__file__).parent.parent / "models" / "elbow"
 SMALL = {"size": (320, 240), "fps": 10}
@@ -340,3 +340,36 @@ def test_the_drawn_tendons_of_the_elbow_do_not_change_its_motion():
         motions.append((data.qpos[0], data.qvel[0]))
     assert motions[0] == motions[1]
     assert motions[0][0] > 0.5
+
+
+def test_muscles_can_be_drawn_into_the_scene_of_any_renderer():
+    program = """
+import mujoco, mjhill
+m = mjhill.load("elbow")
+d = mjhill.at_home(m)
+mjhill.install()
+with mujoco.Renderer(m, 240, 320) as renderer:
+    for d.ctrl[0] in (0, 1):
+        mjhill.equilibrate(m, d)
+        mujoco.mj_forward(m, d)
+        renderer.update_scene(d, camera="side")
+        mjhill.draw_muscles(renderer.scene, m, d)
+        image = renderer.render().astype(int)
+        print((image[..., 0] - image[..., 1:].max(axis=-1) > 120).sum())
+"""
+    result = run_python(program, MUJOCO_GL="egl")
+    assert result.returncode == 0, result.stderr
+    rest, active = map(int, result.stdout.split())
+    assert active > rest + 100  # the plain tendons are a little red
+
+
+def test_a_native_muscle_shows_its_present_activation_and_force():
+    model = mujoco.MjModel.from_xml_string(NATIVE)
+    data = mujoco.MjData(model)
+    data.act[0] = 0.7
+    mujoco.mj_forward(model, data)
+    (muscle,) = drawn_muscles(model, None)
+    activation, force = present_look(data, muscle)
+    assert activation == 0.7
+    assert force == pytest.approx(-data.actuator_force[0] / 25)
+    assert force > 0.1

@@ -4,8 +4,22 @@ import pytest
 from conftest import rest
 
 import mjhill
-from mjhill.readings import shortening_velocity
+from mjhill.callbacks.python import control
+from mjhill.readings import shortening_velocity, tension
 from mjhill.spec import joint_spec
+
+STRONG = mjhill.Muscle(
+    max_isometric_force=100.0,
+    optimal_length=0.0,
+    width_short=0.2,
+    width_long=0.2,
+    max_velocity=2.0,
+    hill_shape=0.3,
+    series_stretch=0.02,
+    excitation_tau=0.03,
+    activation_tau=0.01,
+    deactivation_tau=0.04,
+)
 
 
 def test_a_recording_has_every_series_with_its_unit(pair):
@@ -13,10 +27,18 @@ def test_a_recording_has_every_series_with_its_unit(pair):
         result = mjhill.record(
             pair, rest(pair), duration=0.05, excitation={"elbow_flexor": 0.5}, torque={"elbow": 1.0}
         )
-    muscle = {"u": "-", "n": "-", "a": "-", "velocity": "rad/s", "stretch": "rad", "force": "N·m"}
+    muscle = {
+        "u": "-", "n": "-", "a": "-", "velocity": "rad/s", "stretch": "rad", "force": "N·m",
+        "length": "rad", "length_rate": "rad/s", "contractile_length": "rad",
+        "series_stiffness": "N·m/rad", "series_energy": "J", "contractile_power": "W",
+        "series_power": "W", "power": "W", "contractile_work": "J", "work": "J", "arm_elbow": "-",
+    }  # fmt: skip
     expected = {"elbow.angle": "rad", "elbow.velocity": "rad/s", "elbow.applied": "N·m"}
+    expected["elbow.passive_energy"] = "J"
     for name in ("elbow_flexor", "elbow_extensor"):
         expected |= {f"{name}.{quantity}": unit for quantity, unit in muscle.items()}
+    for quantity in ("kinetic_energy", "damping_loss", "external_work"):
+        expected[f"model.{quantity}"] = "J"
     assert dict(result.units) == expected
     assert len(result) == 51
     np.testing.assert_allclose(np.diff(result.time), 1e-3)
@@ -28,8 +50,8 @@ def test_recorded_force_is_the_force_that_mujoco_applies(pair):
     with mjhill.installed():
         result = mjhill.record(pair, data, duration=0.2, excitation={"elbow_flexor": 0.8})
         mujoco.mj_forward(pair, data)
-    assert result["elbow_flexor.force"][-1] == pytest.approx(-data.actuator_force[0], rel=1e-12)
-    assert result["elbow_flexor.force"][-1] > 1.0
+    assert result["elbow_flexor.force"][-1] == -data.actuator_force[0] > 1.0
+    assert "elbow_flexor.tension" not in result
 
 
 @pytest.mark.parametrize("every", [1, 4])
@@ -75,6 +97,45 @@ def test_under_rk4_a_run_begins_with_the_velocity_of_that_moment(pair, muscle):
     assert expected > 1
 
 
+@pytest.mark.parametrize("integrator", ["EULER", "IMPLICITFAST", "RK4"])
+def test_force_is_the_tension_of_the_series_element(pair, muscle, integrator):
+    pair.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
+    with mjhill.installed():
+        run = mjhill.record(pair, rest(pair), duration=0.2, excitation={"elbow_flexor": 0.8})
+    tensions = [tension(muscle, x) for x in run["elbow_flexor.stretch"].tolist()]
+    np.testing.assert_allclose(run["elbow_flexor.force"], tensions, rtol=1e-13)
+
+
+def limited(elbow, **changes):
+    """The pair of the elbow, its flexor's actuator changed."""
+    spec = joint_spec(elbow)
+    for what, value in changes.items():
+        setattr(spec.actuator("elbow_flexor"), what, value)
+    return spec.compile()
+
+
+def test_a_forcerange_shows_in_force_and_tension_says_what_the_muscle_would_give(elbow):
+    model = limited(elbow, forcerange=[-1, 0], forcelimited=mujoco.mjtLimited.mjLIMITED_TRUE)
+    data = rest(model, elbow_flexor=1.0)
+    with mjhill.installed(), pytest.warns(RuntimeWarning, match="its forcerange, -1 to 0"):
+        run = mjhill.record(model, data, duration=0.2)
+    assert data.actuator_force[0] == -1.0
+    np.testing.assert_array_equal(run["elbow_flexor.force"], 1.0)
+    assert run["elbow_flexor.tension"].min() > 10.0
+    assert run.units["elbow_flexor.tension"] == "N·m"
+    assert "elbow_extensor.tension" not in run
+
+
+def test_a_muscle_of_a_disabled_group_is_recorded_with_no_force(elbow):
+    model = limited(elbow, group=3)
+    model.opt.disableactuator = 1 << 3
+    with mjhill.installed(), pytest.warns(RuntimeWarning, match="its group 3 is disabled"):
+        run = mjhill.record(model, rest(model, elbow_flexor=1.0), duration=0.05)
+    np.testing.assert_array_equal(run["elbow_flexor.force"], 0.0)
+    assert not np.signbit(run["elbow_flexor.force"]).any()
+    assert run["elbow_flexor.tension"][0] > 0.01
+
+
 def test_recording_every_few_steps_keeps_those_steps(pair):
     runs = []
     for every in (1, 5):
@@ -95,6 +156,129 @@ def test_recording_does_not_change_the_run(pair):
         mujoco.mj_step(pair, plain, nstep=100)
     np.testing.assert_array_equal(data.qpos, plain.qpos)
     np.testing.assert_array_equal(data.act, plain.act)
+
+
+def test_a_recorded_input_is_the_one_that_the_muscle_gets(pair):
+    pair.actuator_ctrlrange[1] = 0.2, 0.6
+    pair.actuator_ctrllimited[0] = False
+    signals = [-0.5, 0.1, 0.4, 0.9, 7.0]
+    for clamp in (True, False):
+        flag = mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
+        pair.opt.disableflags = 0 if clamp else flag
+        for value in signals:
+            data = rest(pair)
+            inputs = {"elbow_flexor": value, "elbow_extensor": value}
+            with mjhill.installed():
+                run = mjhill.record(pair, data, duration=0.001, excitation=inputs)
+            for index, name in enumerate(inputs):
+                assert run[f"{name}.u"][-1] == control(pair, data, index)
+
+
+def test_a_delayed_input_is_recorded_when_it_arrives(elbow):
+    spec = joint_spec(elbow)
+    spec.actuator("elbow_flexor").nsample, spec.actuator("elbow_flexor").delay = 40, 0.02
+    model = spec.compile()
+    with mjhill.installed():
+        run = mjhill.record(
+            model, rest(model), duration=0.1, excitation={"elbow_flexor": mjhill.step(0.5, 0.03)}
+        )
+    onset = run.time[np.argmax(run["elbow_flexor.u"] > 0)]
+    assert onset == pytest.approx(0.05, abs=1.5e-3)
+
+
+@pytest.mark.parametrize("arm", [-1.0, 0.04])
+def test_force_times_moment_arm_is_the_torque_on_the_joint(elbow, arm):
+    spec = joint_spec(elbow)
+    tendon = spec.add_tendon(name="t")
+    tendon.wrap_joint("elbow", arm)
+    mjhill.add_muscle(spec, name="m", muscle=elbow.muscles["elbow_flexor"], tendon="t")
+    model = spec.compile()
+    data = rest(model)
+    with mjhill.installed():
+        run = mjhill.record(model, data, duration=0.1, excitation={"m": 0.5})
+    assert run.units["m.arm_elbow"] == "m"
+    muscles = ("m", "elbow_flexor", "elbow_extensor")
+    torque = sum(run[f"{name}.force"][-1] * run[f"{name}.arm_elbow"][-1] for name in muscles)
+    assert torque == pytest.approx(data.qfrc_actuator[0], rel=1e-12)
+    np.testing.assert_array_equal(run["m.arm_elbow"], -arm)
+
+
+def test_moment_arms_follow_a_tendon_over_joints_of_every_kind():
+    model = mujoco.MjSpec.from_string("""
+    <mujoco><option gravity="0 0 -3"/><worldbody><site name="o" pos="0.05 0 0.1"/>
+      <body><joint name="slide" type="slide" axis="0 0 1"/><joint name="hinge" axis="0 1 0"/>
+        <geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.3" contype="0"/>
+        <body pos="0 0 -0.3"><joint name="ball" type="ball"/><site name="i" pos="0.04 0.01 -0.1"/>
+          <geom type="box" size="0.02 0.03 0.1" pos="0 0 -0.1" contype="0"/></body></body>
+      <body pos="1 0 0"><freejoint name="free"/><geom size="0.1" contype="0"/></body></worldbody>
+      <tendon><spatial name="t"><site site="o"/><site site="i"/></spatial></tendon></mujoco>""")
+    mjhill.add_muscle(model, name="m", muscle=STRONG, tendon="t")
+    model = model.compile()
+    data = mujoco.MjData(model)
+    with mjhill.installed():
+        run = mjhill.record(model, data, duration=0.05, excitation={"m": 1.0}, every=5)
+    names = ["slide", "hinge", "ball0", "ball1", "ball2"]
+    arms = {name: unit for name, unit in run.units.items() if ".arm_" in name}
+    assert arms == {f"m.arm_{name}": "-" if name == "slide" else "m" for name in names}
+    torque = np.array([run[f"m.arm_{name}"][-1] * run["m.force"][-1] for name in names])
+    np.testing.assert_allclose(torque, data.qfrc_actuator[:5], rtol=1e-10)
+    assert run["m.length_rate"][-1] == data.actuator_velocity[0]
+    np.testing.assert_allclose(
+        run["m.contractile_length"], run["m.length"] - run["m.stretch"], rtol=0, atol=1e-15
+    )
+
+
+@pytest.mark.parametrize("every", [1, 7])
+def test_powers_add_up_and_are_the_rates_of_works_and_energies(pair, every):
+    with mjhill.installed():
+        run = mjhill.record(
+            pair, rest(pair), duration=0.3, every=every, excitation={"elbow_flexor": 0.6}
+        )
+    steps = np.diff(run.time)
+    for name in ("elbow_flexor", "elbow_extensor"):
+        for power, work, sign in (
+            ("contractile_power", "contractile_work", 1),
+            ("series_power", "series_energy", -1),
+            ("power", "work", 1),
+        ):
+            rate = sign * np.diff(run[f"{name}.{work}"]) / steps
+            np.testing.assert_allclose(run[f"{name}.{power}"][1:], rate, rtol=1e-9, atol=1e-12)
+        parts = run[f"{name}.contractile_power"] + run[f"{name}.series_power"]
+        largest = np.abs(parts).max()
+        np.testing.assert_allclose(
+            run[f"{name}.power"], parts, rtol=0, atol=2e-3 * every**2 * largest
+        )
+
+
+def test_series_stiffness_is_the_slope_of_force_over_stretch(pair):
+    with mjhill.installed():
+        run = mjhill.record(pair, rest(pair), duration=0.2, excitation={"elbow_flexor": 0.6})
+    force, stretch = run["elbow_flexor.force"], run["elbow_flexor.stretch"]
+    slope = np.diff(force[:80]) / np.diff(stretch[:80])
+    stiffness = run["elbow_flexor.series_stiffness"]
+    np.testing.assert_allclose(slope, 0.5 * (stiffness[1:80] + stiffness[:79]), rtol=2e-3)
+
+
+def test_a_muscle_with_the_name_of_its_joint_is_refused(elbow):
+    spec = joint_spec(elbow)
+    spec.actuator("elbow_flexor").name = "elbow"
+    model = spec.compile()
+    with mjhill.installed(), pytest.raises(ValueError, match="both would have the series"):
+        mjhill.record(model, mujoco.MjData(model), duration=0.01)
+
+
+def test_an_actuator_without_a_name_and_one_called_like_it_are_refused(elbow):
+    spec = joint_spec(elbow)
+    spec.actuator("elbow_flexor").name, spec.actuator("elbow_extensor").name = "", "actuator0"
+    model = spec.compile()
+    with mjhill.installed(), pytest.raises(ValueError, match="'actuator0': another one"):
+        mjhill.record(model, mujoco.MjData(model), duration=0.01)
+
+
+def test_a_recording_has_the_parameters_of_its_muscles(pair, elbow):
+    with mjhill.installed():
+        run = mjhill.record(pair, rest(pair), duration=0.01)
+    assert run.muscles == elbow.muscles
 
 
 def test_a_run_goes_on_from_where_the_data_is(pair):
@@ -157,9 +341,14 @@ def test_an_input_of_the_wrong_type_says_what_to_pass(pair):
 
 
 def test_a_run_in_which_mujoco_warned_is_a_failed_run(pair):
+    with mjhill.installed(), pytest.raises(RuntimeError, match="MuJoCo warned 'badqacc'"):
+        mjhill.record(pair, rest(pair), duration=0.1, torque={"elbow": 1e12})
+
+
+def test_a_start_that_no_muscle_can_be_in_is_refused(pair):
     data = rest(pair)
     data.qvel[0] = 1e12
-    with mjhill.installed(), pytest.raises(RuntimeError, match="MuJoCo warned 'badqvel'"):
+    with mjhill.installed(), pytest.raises(ValueError, match="'elbow_extensor': it is lengthened"):
         mjhill.record(pair, data, duration=0.1)
 
 

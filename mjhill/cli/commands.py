@@ -13,6 +13,7 @@ from mjhill.cli.check import check
 from mjhill.cli.identify import identify
 from mjhill.cli.printing import json_option, print_paths, print_table, progress_bar, shown
 from mjhill.cli.reproduce import reproduce
+from mjhill.cli.view import view
 
 _OUT = Path("out")
 _SUFFIXES = {"recording": (".csv", ".npz"), "plot": (".png",), "video": (".mp4", ".gif")}
@@ -47,6 +48,7 @@ def main() -> None:
 main.add_command(check)
 main.add_command(identify)
 main.add_command(reproduce)
+main.add_command(view)
 
 
 def _inputs_option(function: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -37,6 +38,8 @@ _BELLY_START = 0.05  # from the path's first end, the origin
 _TENDON_LENGTH = 0.27  # from the belly to the path's last end, the insertion
 _ARC_STEP = 0.4  # of a drawn arc [rad]
 
+_HIDDEN_GROUP = 5  # MuJoCo's default visualisation leaves groups 3 to 5 out
+
 
 @dataclass(frozen=True)
 class DrawnMuscle:
@@ -44,12 +47,16 @@ class DrawnMuscle:
 
     Attributes:
         name: The actuator's name.
+        activation: Index of its activation in ``act``.
+        out: Index into ``actuator_force``.
         max_force: Maximum isometric force [N or N·m].
         tendon: Id of the tendon that gives the path; -1 where there is none to draw.
         colour: The muscle's own colour, RGB in [0, 1].
     """
 
     name: str
+    activation: int
+    out: int
     max_force: float
     tendon: int
     colour: Colour
@@ -87,7 +94,11 @@ def drawn_muscles(model: mujoco.MjModel, recording: Recording | None) -> tuple[D
         if force is None or not recorded:
             continue
         colour = MUSCLE_COLOURS[len(found) % len(MUSCLE_COLOURS)]
-        found.append(DrawnMuscle(name, force, _tendon(model, i), colour))
+        # ours have n, a, s; the native muscle has a
+        activation = int(model.actuator_actadr[i]) + layout.is_muscle(model, i)
+        out = int(model.actuator_outadr[i])
+        tendon = _tendon(model, i, name)
+        found.append(DrawnMuscle(name, activation, out, force, tendon, colour))
     return tuple(found)
 
 
@@ -121,6 +132,64 @@ def muscle_shapes(
     return shapes
 
 
+def draw_muscles(scene: Any, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Add every muscle's belly and tendon to a scene, as they are in ``data``.
+
+    A belly turns from slate to red with activation and thickens with force. For the
+    ``user_scn`` of a passive viewer, whose ``ngeom`` is to be set to 0 first, or the ``scene``
+    of a ``mujoco.Renderer`` after ``update_scene``.
+
+    Args:
+        scene: A ``mujoco.MjvScene``; one that is full takes no more.
+        model: The model.
+        data: Its state after ``mj_forward`` or ``mj_step``.
+    """
+    for muscle in drawn_muscles(model, None):
+        add_muscle(scene, model, data, muscle, *present_look(data, muscle))
+
+
+def present_look(data: mujoco.MjData, muscle: DrawnMuscle) -> tuple[float, float]:
+    """Activation, and force as a fraction of the maximum isometric force, in ``data`` [-]."""
+    # MuJoCo's force is negative where it pulls
+    force = -float(data.actuator_force[muscle.out]) / max(muscle.max_force, mujoco.mjMINVAL)
+    return float(data.act[muscle.activation]), force
+
+
+def add_muscle(
+    scene: Any,
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    muscle: DrawnMuscle,
+    activation: float,
+    force: float,
+) -> None:
+    """Put a muscle's belly and tendon into a scene; nothing if it has no path.
+
+    Args:
+        scene: A ``mujoco.MjvScene``.
+        model: The model.
+        data: Data whose tendons are up to date (``mj_fwdKinematics``).
+        muscle: Which muscle.
+        activation: From 0 to 1 [-].
+        force: Force as a fraction of the maximum isometric force [-].
+    """
+    if muscle.tendon < 0:
+        return
+    red = activation_colour(activation)
+    for shape in muscle_shapes(model, data, muscle, force):
+        if shape.belly:
+            _add_shape(scene, shape, red, 0.05 + 0.1 * min(max(activation, 0.0), 1.0))
+        else:
+            _add_shape(scene, shape, muscle.colour, 0.05)
+
+
+def hide_tendons(model: mujoco.MjModel, muscles: Iterable[DrawnMuscle]) -> None:
+    """Move the plain tendons of muscles that are drawn to a group that is not shown."""
+    for muscle in muscles:
+        if muscle.tendon >= 0:
+            model.tendon_group[muscle.tendon] = _HIDDEN_GROUP
+
+
 def _max_force(model: mujoco.MjModel, actuator: int) -> float | None:
     if layout.is_muscle(model, actuator):
         array, slot = layout.SLOTS["max_isometric_force"]
@@ -133,8 +202,7 @@ def _max_force(model: mujoco.MjModel, actuator: int) -> float | None:
     return float(force if force >= 0 else scale / max(mujoco.mjMINVAL, acceleration))
 
 
-def _tendon(model: mujoco.MjModel, actuator: int) -> int:
-    name = layout.actuator_names(model)[actuator]
+def _tendon(model: mujoco.MjModel, actuator: int, name: str) -> int:
     tendon = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, name))
     if tendon < 0 and model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_TENDON:
         tendon = int(model.actuator_trnid[actuator, 0])
@@ -205,7 +273,7 @@ def _belly(branch: Points, rest: float, radius: float) -> list[Shape]:
     ]
 
 
-def add_shape(scene: Any, shape: Shape, rgb: Any, emission: float) -> None:
+def _add_shape(scene: Any, shape: Shape, rgb: Any, emission: float) -> None:
     """Put a shape into a scene; one that is full takes no more."""
     if scene.ngeom >= scene.maxgeom:
         return

@@ -14,12 +14,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.rendering.bellies import DrawnMuscle, activation_colour, add_shape, muscle_shapes
+from mjhill.rendering.bellies import DrawnMuscle, add_muscle, hide_tendons
 
 Image = NDArray[np.uint8]
 
 _SPARE_GEOMS = 2000
-_HIDDEN_GROUP = 5  # MuJoCo's default visualisation leaves groups 3 to 5 out
 
 
 @dataclass(frozen=True)
@@ -60,23 +59,13 @@ class Stage:
             self.model, self.data, self._option, None, self._camera, everything, self._scene
         )
         for muscle, (activation, force) in zip(self.muscles, looks, strict=True):
-            self._add_muscle(muscle, activation, force)
+            add_muscle(self._scene, self.model, self.data, muscle, activation, force)
         height, width, _ = self._pixels.shape
         view = mujoco.MjrRect(0, 0, width, height)
         self._gl.make_current()
         mujoco.mjr_render(view, self._scene, self._context)
         mujoco.mjr_readPixels(self._pixels, None, view, self._context)
         return self._pixels[::-1]  # OpenGL's first row is the lowest
-
-    def _add_muscle(self, muscle: DrawnMuscle, activation: float, force: float) -> None:
-        if muscle.tendon < 0:
-            return
-        red = activation_colour(activation)
-        for shape in muscle_shapes(self.model, self.data, muscle, force):
-            if shape.belly:
-                add_shape(self._scene, shape, red, 0.05 + 0.1 * min(max(activation, 0.0), 1.0))
-            else:
-                add_shape(self._scene, shape, muscle.colour, 0.05)
 
 
 @contextmanager
@@ -141,9 +130,7 @@ def _private_copy(
     # a shadow needs no more detail than the picture it falls into
     detail = 1 << max(size).bit_length()
     private.vis.quality.shadowsize = min(private.vis.quality.shadowsize, detail)
-    for muscle in muscles:
-        if muscle.tendon >= 0:
-            private.tendon_group[muscle.tendon] = _HIDDEN_GROUP
+    hide_tendons(private, muscles)
     return private
 
 

@@ -1,0 +1,25 @@
+"""The command ``mjhill view``."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import click
+
+
+@click.command()
+@click.argument("model")
+@click.option("--paused", is_flag=True, help="Wait for Space at the start.")
+@click.option("--speed", default=1.0, show_default=True, help="1 is real time, less is slow.")
+def view(model: str, paused: bool, speed: float) -> None:
+    """Run MODEL, a joint's name or a path, in a window; its sliders excite the muscles.
+
+    Space runs or pauses, the right arrow steps while paused, the left arrow goes back, Backspace
+    restarts, - and = change the speed. Ctrl-C, or closing the window, ends it.
+    """
+    from mjhill.models import load
+    from mjhill.rendering import view as show
+
+    loaded = load(model)
+    with suppress(KeyboardInterrupt):
+        show(loaded, paused=paused, speed=speed)
