@@ -4,7 +4,7 @@ from click.testing import CliRunner
 from mjhill.bench import checks
 from mjhill.cli import main
 
-COUNT = 24
+COUNT = 15
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-import mujoco
+import numpy as np
 import pytest
 
 from mjhill.bench import endurance
@@ -24,8 +24,6 @@ def test_the_two_starts_are_far_apart_at_first():
 
 
 def test_a_run_that_warns_is_refused(monkeypatch):
-    inputs = endurance._inputs
-    monkeypatch.setattr(endurance, "_inputs", lambda change, pairs: inputs(change, pairs) * 1e12)
+    monkeypatch.setattr(endurance, "_inputs", lambda change, pairs: np.full((pairs, 2), np.nan))
     with pytest.raises(RuntimeError, match=r"MuJoCo warned WARN_BADCTRL within 100 steps"):
         endurance.endure("implicitfast", 1, SMALL)
-    assert mujoco.mjMAXVAL < 1e12

@@ -146,6 +146,18 @@ def test_a_name_that_would_control_a_terminal_is_escaped(pair, muscle):
     assert r"muscle 'a\x1b[2J\nb'" in str(found)
 
 
+def test_a_muscle_torn_by_its_joint_is_named_though_its_elements_would_carry_the_force(elbow):
+    name = "elbow_extensor"
+    slow = replace(elbow.muscles[name], max_velocity=0.01)
+    model = joint_spec(replace(elbow, muscles={**elbow.muscles, name: slow})).compile()
+    data = rest(model, elbow_flexor=1.0)
+    with mjhill.installed(), pytest.warns(RuntimeWarning, match="did what no muscle can"):
+        run = mjhill.record(model, data, duration=0.5)
+    (found,) = [f for f in mjhill.transients(run) if f.muscle == name and f.kind == "force"]
+    assert found.value > found.limit == 3 * slow.max_isometric_force
+    assert "times V_max, which tears it" in found.cause
+
+
 @pytest.mark.parametrize("integrator", ["IMPLICITFAST", "RK4"])
 @pytest.mark.parametrize("name", list(mjhill.JOINTS))
 def test_the_scripted_movement_of_a_joint_has_no_finding(name, integrator):
