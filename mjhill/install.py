@@ -33,7 +33,7 @@ _lock = PROCESS.lock
 _stack: list[_Installation] = PROCESS.installations
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class _Installation:
     backend: Backend
     before: dict[str, Slot]
@@ -57,6 +57,10 @@ def install(backend: Backend = "compiled") -> None:
         RuntimeError: Another callback was put over an installation of ours, or MuJoCo's
             structs are not laid out as its headers say.
     """
+    _install(backend)
+
+
+def _install(backend: Backend) -> _Installation:
     if backend not in get_args(Backend):
         known = " or ".join(map(repr, get_args(Backend)))
         raise ValueError(f"backend must be {known}, got {backend!r}")
@@ -73,6 +77,7 @@ def install(backend: Backend = "compiled") -> None:
             raise
         ours = {name: read(name) for name in NAMES}
         _stack.append(_Installation(backend, before, ours, served))
+        return _stack[-1]
 
 
 def uninstall() -> None:
@@ -85,9 +90,20 @@ def uninstall() -> None:
     with _lock:
         if not _stack:
             raise RuntimeError("mjhill is not installed; call mjhill.install() first")
-        installation = _stack.pop()
-        replaced = _replaced(installation)
-        restore(installation.before)
+        _uninstall(_stack[-1])
+
+
+def _uninstall(installation: _Installation) -> None:
+    with _lock:
+        if installation not in _stack:
+            raise RuntimeError("mjhill was uninstalled meanwhile; call mjhill.install() again")
+        above = _stack.index(installation) + 1
+        if above < len(_stack):  # of another thread, which goes on with its own
+            _stack[above].before = installation.before
+            _stack.remove(installation)
+            return
+        replaced = _replaced(_stack.pop())
+        _put_back(installation.before)
     if replaced:
         raise RuntimeError(
             f"{_listed(replaced)} replaced while mjhill was installed, and now removed; "
@@ -99,20 +115,22 @@ def uninstall() -> None:
 def installed(backend: Backend = "compiled") -> Iterator[None]:
     """``install`` for the length of a ``with`` block, and exactly what was there after it.
 
+    Blocks of several threads may overlap: callbacks are restored when the last one ends.
+
     Raises:
         ValueError: There is no such back-end.
         RuntimeError: As ``install`` and ``uninstall``.
     """
-    install(backend)
+    installation = _install(backend)
     try:
         yield
     except BaseException as error:
         try:
-            uninstall()
+            _uninstall(installation)
         except RuntimeError as second:
             error.add_note(str(second))
         raise
-    uninstall()
+    _uninstall(installation)
 
 
 def installed_backend() -> Backend | None:
@@ -157,8 +175,9 @@ def _put_compiled(served: dict[str, Slot]) -> None:
     for index, name in enumerate(NAMES):
         compiled.chain[index] = served[name].pointer
         function = TYPES[name](getattr(compiled, name))
-        if served[name].is_python:
-            # the bindings must go on holding the Python function that we pass on to
+        if read(name).is_python:
+            # the bindings must go on holding the Python function: we pass on to it, or another
+            # thread is about to call it
             global_pointer(name).value = getattr(compiled, name)
         else:
             getattr(mujoco, f"set_mjcb_{name}")(function)
@@ -201,6 +220,15 @@ def _callable(name: str, slot: Slot) -> Callable[..., Any] | None:
         return slot.holder  # type: ignore[no-any-return]
     function = TYPES[name](slot.pointer)
     return lambda model, data, *actuator: function(model._address, data._address, *actuator)
+
+
+def _put_back(slots: dict[str, Slot]) -> None:
+    """What callbacks held before; a Python function that a thread may be about to call stays."""
+    for name, slot in slots.items():
+        if _stack and not slot.is_python and read(name).is_python:
+            global_pointer(name).value = slot.pointer
+        else:
+            restore({name: slot})
 
 
 def _replaced(installation: _Installation) -> list[str]:

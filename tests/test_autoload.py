@@ -355,3 +355,33 @@ def test_a_fork_while_another_thread_installs_is_no_deadlock():
     print("done")
     """
     assert python(code, PYTHONWARNINGS="ignore")[0] == "done"
+
+
+@pytest.mark.parametrize("automatic", ["0", "1"])
+def test_threads_with_a_back_end_each_step_side_by_side(automatic):
+    code = """
+    import sys, threading, time, mujoco, mjhill
+    models = {backend: mjhill.load("elbow") for backend in ("compiled", "python")}
+    with mjhill.installed():
+        pass
+    errors, ends = [], set()
+    sys.setswitchinterval(1e-5)  # what may happen between two instructions, happens
+    end = time.monotonic() + 1.5
+    def work(backend):
+        try:
+            while time.monotonic() < end:
+                data = mujoco.MjData(models[backend])
+                data.ctrl[:] = [0.5, 0.2]
+                for _ in range(10):
+                    with mjhill.installed(backend):
+                        mujoco.mj_step(models[backend], data)
+                        mujoco.mj_step(models[backend], data)
+                ends.add(round(float(data.qpos[0]), 12))
+        except Exception as error:
+            errors.append(error)
+    threads = [threading.Thread(target=work, args=(backend,)) for backend in models]
+    [thread.start() for thread in threads]
+    [thread.join() for thread in threads]
+    print(errors, len(ends))  # the same movement, whichever back-end took which step
+    """
+    assert python(code, MJHILL_AUTOLOAD=automatic) == ("[] 1", "")
