@@ -11,10 +11,15 @@ be half imported when MuJoCo calls.
 
 from __future__ import annotations
 
+import _thread
 import ctypes
 import math
 import os
+import signal
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import mujoco
@@ -117,7 +122,8 @@ def _passive(m: int, d: int) -> None:
         TYPES["passive"](passed_on)(m, d)
     _loaded.foreign += 1
     if offsets and _loaded.foreign >= _BEFORE_GUARD and not _loaded.guarded:
-        _put_guard(offsets[0], NUSER_JNT)
+        with _interrupts_waiting():
+            _put_guard(offsets[0], NUSER_JNT)
 
 
 def _tag(pointer: int, actuator: int) -> float:
@@ -140,7 +146,8 @@ def _offsets() -> tuple[int, int] | None:
             try:
                 from mjhill.callbacks.structs import offset, verify_fields
 
-                verify_fields()
+                with _interrupts_waiting():
+                    verify_fields()
                 nuser, rows = offset("mjModel.nuser_jnt"), offset("mjModel.actuator_dynprm")
                 _loaded.offsets = nuser, rows
             except Exception as error:
@@ -158,10 +165,35 @@ def _functions() -> dict[str, Any] | None:
         if not _loaded.tried:
             _loaded.tried = True  # before, because loading makes a small model, which asks again
             try:
-                _load()
+                with _interrupts_waiting():
+                    _load()
             except Exception as error:
                 _say(error)
         return _loaded.functions
+
+
+@contextmanager
+def _interrupts_waiting() -> Iterator[None]:
+    """Keep Ctrl-C waiting: raised in a callback from C it would be lost, and the load with it.
+
+    The same for SIGTERM where the program turns it into an exception.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    waiting: list[int] = []
+    before = {
+        number: signal.signal(number, lambda arrived, _: waiting.append(arrived))
+        for number in (signal.SIGINT, signal.SIGTERM)
+        if callable(signal.getsignal(number))
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for arrived in waiting[:1]:  # soon, when the callback has returned
+            threading.Timer(0.02, _thread.interrupt_main, (arrived,)).start()
 
 
 def _load() -> None:

@@ -47,6 +47,19 @@ def rows(model: str | Path) -> list[dict[str, Any]]:
     return [row for part in parts for row in _part_rows(*part)]
 
 
+def gravity(model: str | Path) -> str:
+    """The gravity of a model in words.
+
+    Raises:
+        ValueError: As ``load``.
+    """
+    loaded = load(model)
+    off = loaded.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
+    if off or not loaded.opt.gravity.any():
+        return "none" + (", as in the movements of the paper" if str(model) in JOINTS else "")
+    return f"{' '.join(f'{value:g}' for value in loaded.opt.gravity)} m/s²"
+
+
 def _angle_rows(joint: Joint) -> Iterator[dict[str, Any]]:
     """The angles of a joint that are no parameters of its model."""
     low, high = joint.range

@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -26,6 +28,8 @@ from mjhill.models import load
 from mjhill.parameters import Joint
 from mjhill.readings import steady_stretch
 
+# what a terminal acts upon, or an XML reader takes for a space
+_HIDDEN = re.compile("[\x00-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u206f]")
 _HEAD = """<mujocoinclude>
   <!-- Made from mjhill/data/joints.toml, which has the sources, by `make models`. -->
   <size nuser_jnt="{nuser}"/>
@@ -104,17 +108,24 @@ def snippet(model: str | Path) -> str:
     lines = []
     for name, _ in elastic_joints(loaded):
         row = passive_row(read_passive(loaded, name))
-        lines.append(f'<joint name="{name}" user="{_text(row)}"/>')
+        lines.append(f'<joint name={_quoted(name)} user="{_text(row)}"/>')
     for name, at in addresses(loaded):
         rows = parameter_rows(read_muscle(loaded, name))
+        gear = f"{loaded.actuator_gear[at.out, 0]:g}"
         lines += [
-            f'<general name="{name}" gear="{loaded.actuator_gear[at.out, 0]:g}" dyntype="user"',
+            f'<general name={_quoted(name)} gear="{gear}" dyntype="user"',
             f'  actdim="{STATES}" gaintype="fixed" biastype="user" ctrlrange="0 1"',
             '  lengthrange="-1 1"',
             *(f'  {array}="{_text(row)}"' for array, row in rows.items()),
         ]
         lines[-1] += "/>"
     return "\n".join(lines)
+
+
+def _quoted(text: str) -> str:
+    """A value of an XML attribute with its quotes; control characters become references."""
+    escaped = escape(text, {'"': "&quot;"})
+    return f'"{_HIDDEN.sub(lambda found: f"&#{ord(found[0])};", escaped)}"'
 
 
 def write_parameters(folder: Path) -> list[Path]:

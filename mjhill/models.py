@@ -29,7 +29,9 @@ def model_path(joint: str) -> Path:
 def load(model: str | Path) -> mujoco.MjModel:
     """Load and check a model: the name of a joint that comes with mjhill, or an MJCF or MJB file.
 
-    Works while callbacks are installed, Python ones too.
+    The joints that come with mjhill have no gravity, as the movements of the paper;
+    ``model.opt.gravity[2] = -9.81`` gives them some. Works while callbacks are installed, Python
+    ones too.
 
     Args:
         model: A joint's name, such as ``"elbow"``, or a path that ends in .xml or .mjb.

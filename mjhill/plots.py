@@ -241,9 +241,18 @@ def _draw(
         legend.get_title().set_multialignment("center")
     elif title:
         figure.suptitle(title, fontsize=12)
+    take_literally(figure)
     with replacing(path) as partial:
         figure.savefig(partial, dpi=_DPI)
     return path
+
+
+def take_literally(figure: Any) -> None:
+    """Let no text of a figure be a formula: names and titles may hold dollar signs."""
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)
 
 
 def _draw_axis(plot: Any, axis: _Axis) -> None:

@@ -121,3 +121,9 @@ def test_processes_that_start_at_once_with_an_empty_cache_compile_once(folder):
     assert [process.returncode for process in started] == [0] * 6
     assert len({angle for angle, _ in results}) == 1
     assert [compiled for _, compiled in results].count(b"True") == 1
+
+
+def test_what_a_killed_process_left_is_removed_by_the_next_that_compiles(kept, folder):
+    (folder / f".{kept.name}.1.partial").write_bytes(b"half")
+    code_cache.write(kept, CODE)
+    assert [entry.name for entry in folder.iterdir()] == [kept.name]

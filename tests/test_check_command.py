@@ -1,9 +1,12 @@
 import json
+import subprocess
+import sys
 
 import mujoco
 import pytest
 from click.testing import CliRunner
 from test_tendons import arm
+from test_transients import slipping
 
 import mjhill
 from mjhill.cli import main
@@ -51,3 +54,19 @@ def test_a_model_that_is_refused_ends_in_exit_code_2(pair, tmp_path):
     result = check(saved(pair, tmp_path))
     assert result.exit_code == 2
     assert "muscle 'elbow_extensor': activation_tau must be in" in result.stderr
+
+
+def test_run_says_in_one_line_what_no_muscle_can_do(tmp_path):
+    model, _ = slipping()
+    path = saved(model, tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-m", "mjhill", "run", str(path), "-d", "0.3", "-e", "puller=0.1",
+         "-t", "joint=30", "-o", "run.csv"],
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    lines = done.stderr.splitlines()
+    assert [line.partition(" at ")[0] for line in lines] == [
+        "warning: muscle 'puller' did what no muscle can" for line in lines
+    ]
+    assert lines
+    assert check(path).exit_code == 3  # foretold

@@ -164,3 +164,14 @@ def test_a_malformed_parameter_file_is_refused(tmp_path, old, new, message):
     refused(identify("hip", "--parameters", path), f"{path}: ")
     refused(identify("hip", "--parameters", path), message)
     assert not Path("out").exists()
+
+
+@pytest.mark.parametrize("name", ["../trav", "/tmp/trav"])
+def test_a_joint_named_like_a_path_is_refused_and_nothing_written(tmp_path, name):
+    text = parameter_file().read_text(encoding="utf-8")
+    hip = text[text.index("[hip]") : text.index("[head]")].replace("[hip", f'["{name}"')
+    path = tmp_path / "mine.toml"
+    path.write_text(hip, encoding="utf-8")
+    result = identify(name, "--parameters", path, "-o", tmp_path / "out")
+    refused(result, f"{path}: joint {name!r}: a name must be 1 to 64 letters")
+    assert names(tmp_path) == ["mine.toml"]

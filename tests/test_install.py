@@ -249,3 +249,49 @@ def test_a_read_only_home_still_compiles(tmp_path):
         [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False
     )
     assert run.stdout.strip() == "True", run.stderr
+
+
+MOVED = """
+import dataclasses, sys
+import mujoco.introspect.structs as structs
+from mujoco.introspect.ast_nodes import StructFieldDecl, ValueType
+new = StructFieldDecl(name="new", type=ValueType(name="mjtNum"), doc="")
+for name in ("mjModel", "mjData"):
+    declared = structs.STRUCTS[name]
+    fields = (*declared.fields[:5], new, *declared.fields[5:])
+    structs.STRUCTS = {**structs.STRUCTS, name: dataclasses.replace(declared, fields=fields)}
+import mujoco, numpy as np
+model = mujoco.MjModel.from_xml_path(sys.argv[1])
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+print(np.isnan(data.actuator_force).all())
+import mjhill
+try:
+    mjhill.install()
+except RuntimeError as error:
+    print(error)
+mujoco.mj_resetData(model, data)
+data.ctrl[:] = 1
+with mjhill.installed(backend="python"):
+    mujoco.mj_step(model, data, 20)
+print(data.actuator_force.min() < -1)
+"""
+
+
+def test_after_an_upgrade_that_moves_a_field_nothing_is_read_and_the_ways_out_are_said():
+    environment = {k: v for k, v in os.environ.items() if k != "MJHILL_AUTOLOAD"}
+    run = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", MOVED, str(mjhill.model_path("elbow"))],
+        env=environment, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    not_numbers, told, python_works = run.stdout.splitlines()
+    assert (not_numbers, python_works) == ("True", "True")
+    for words in (
+        f"MuJoCo {mujoco.__version__} keeps mjModel.",
+        f"mjhill {mjhill.__version__} cannot run with it",
+        "pip install --upgrade mjhill",
+        "pip install mujoco==",
+        'backend="python"',
+    ):
+        assert words in told
+    assert told in run.stderr  # by a step in a process that did not import mjhill

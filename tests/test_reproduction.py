@@ -162,17 +162,20 @@ def test_an_experiment_that_is_not_there_fails_alone(tmp_path):
 INTERRUPTED = """
 import sys
 from small_experiments import entry
+from mjhill.interrupts import handled
 from mjhill.reproduction import report_of, reproduce, write_report
 catalogue = (entry("rise"), entry("endless"), entry("rise", id="last"))
-outcome = reproduce(sys.argv[1], catalogue=catalogue, jobs=1)
-write_report(report_of(outcome), sys.argv[1])
+with handled():
+    outcome = reproduce(sys.argv[1], catalogue=catalogue, jobs=1)
+    write_report(report_of(outcome), sys.argv[1])
 sys.exit(outcome.exit_code)
 """
 
 
-def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path):
+def ended(folder, number, whole_group):
+    """Exit code and words of a run that gets a signal while a part is at work in a process."""
     process = subprocess.Popen(
-        [sys.executable, "-c", INTERRUPTED, str(tmp_path)],
+        [sys.executable, "-c", INTERRUPTED, str(folder)],
         env={**os.environ, "PYTHONPATH": f"{TESTS}:{TESTS.parent}"},
         start_new_session=True,  # a group of its own, to which Ctrl-C goes as in a terminal
         stderr=subprocess.PIPE,
@@ -180,21 +183,31 @@ def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path):
     )
     try:
         until = time.monotonic() + 60
-        while not list(tmp_path.glob(".endless*")):
+        while not list(folder.glob(".endless*")):
             assert time.monotonic() < until
             assert process.poll() is None
             time.sleep(0.05)
         group = psutil.Process(process.pid).children(recursive=True)
         assert group
-        os.killpg(process.pid, signal.SIGINT)
+        (os.killpg if whole_group else os.kill)(process.pid, number)
         _, errors = process.communicate(timeout=30)
     finally:
         process.kill()
         process.communicate()
-    assert process.returncode == 130
-    assert errors == ""
     _, alive = psutil.wait_procs(group, timeout=10)
     assert alive == []
+    return process.returncode, errors
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_killed_run_leaves_no_process_and_no_half_file(tmp_path, number):
+    code, _ = ended(tmp_path, number, whole_group=False)
+    assert code == (143 if number == signal.SIGTERM else -number)
+    assert set(made(tmp_path)) == {"rise-elbow.json", "rise-elbow.png"}
+
+
+def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path):
+    assert ended(tmp_path, signal.SIGINT, whole_group=True) == (130, "")
     assert set(made(tmp_path)) == {
         "rise-elbow.json",
         "rise-elbow.png",

@@ -205,5 +205,5 @@ def test_the_command_runs_until_it_is_interrupted(screen):
     with on(screen, "-m", "mjhill", "view", "elbow") as process:
         wait_for(lambda: screen.picture().std() > 30)
         process.send_signal(signal.SIGINT)
-        assert process.wait() == 0
-        assert (process.stdout.read(), process.stderr.read()) == ("", "")
+        assert process.wait() == 130
+        assert (process.stdout.read(), process.stderr.read()) == ("", "interrupted\n")

@@ -13,7 +13,10 @@ from typing import cast
 from mjhill.bench.result import Result
 
 NAMES = ("accuracy", "cost", "threads", "start", "video")
-LONG = ("sweep", "fuzz", "checks", "endurance")  # minutes each: run by name, one at a time
+# on two cores without a graphics card
+SECONDS = {"accuracy": 10, "cost": 20, "threads": 10, "start": 30, "video": 230}
+# run by name, one at a time
+LONG = {"sweep": 120, "fuzz": 300, "checks": 150, "endurance": 150}
 
 
 def run(
@@ -24,13 +27,7 @@ def run(
     Raises:
         ValueError: There is no such benchmark; the message lists those there are.
     """
-    for name in names:
-        if name not in NAMES:
-            raise ValueError(
-                f"unknown benchmark {name!r}; there are: {', '.join(NAMES)}"
-                f"; by themselves: {', '.join(LONG)}"
-            )
-    chosen = names or NAMES
+    chosen = check_names(names)
     results = {}
     for index, name in enumerate(chosen):
         results[name] = import_module(f"mjhill.bench.{name}").measure()
@@ -60,6 +57,27 @@ def run_long(
             raise ValueError(f"{word} does not go with mjhill bench {name}")
     given = {option: value for option, value in options.items() if option in known}
     return cast(Result, measure(**given, progress=progress))
+
+
+def check_names(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The benchmarks that are asked for, all without any.
+
+    Raises:
+        ValueError: There is no such benchmark; the message lists those there are.
+    """
+    for name in names:
+        if name not in NAMES:
+            raise ValueError(
+                f"unknown benchmark {name!r}; there are: {', '.join(NAMES)}"
+                f"; by themselves: {', '.join(LONG)}"
+            )
+    return names or NAMES
+
+
+def length(names: tuple[str, ...]) -> str:
+    """How long benchmarks take on two cores, in words."""
+    seconds = sum((SECONDS | LONG)[name] for name in names)
+    return f"about {seconds} s" if seconds < 90 else f"about {round(seconds / 60)} minutes"
 
 
 def versions() -> str:

@@ -12,7 +12,8 @@ class Result:
 
     Attributes:
         title: What was measured.
-        rows: Rows of the table, all with the same keys.
+        rows: Rows of the table, all with the same keys. ``goal`` is what was wanted, ``met``
+            whether it was reached; None where nothing is wanted of a row.
         notes: One line each: how it was measured, how it compares with the goal.
     """
 

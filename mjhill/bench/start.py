@@ -35,7 +35,8 @@ def measure() -> Result:
 
 
 def _row(what: str, seconds: list[float], goal: float) -> dict[str, Any]:
-    return {"what": what, "median [s]": statistics.median(seconds), "goal [s]": goal}
+    median = statistics.median(seconds)
+    return {"what": what, "goal": f"≤ {goal:g} s", "median [s]": median, "met": median <= goal}
 
 
 def _seconds(statement: str, cache: str) -> float:

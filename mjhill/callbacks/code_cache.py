@@ -114,6 +114,8 @@ def write(path: Path, code: Code) -> None:
     content = archive.getvalue()
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     with contextlib.suppress(OSError):
+        for left in path.parent.glob(f".{path.name}.*.partial"):
+            left.unlink()  # by a killed process: one at a time makes this file
         try:
             flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW | os.O_CLOEXEC
             with open(os.open(partial, flags, 0o600), "wb") as file:

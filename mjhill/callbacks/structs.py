@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import ctypes
 from functools import cache
+from importlib.metadata import version
 from typing import Any
 
 import mujoco
 import numpy as np
 
+_MADE_FOR = "4.0.0"  # the newest MuJoCo that all this was tested with
 _SCALARS = {
     "mjtNum": ctypes.c_double,
     "float": ctypes.c_float,
@@ -48,18 +50,29 @@ def offset(path: str) -> int:
     for name in names:
         field = getattr(kind, name, None)
         if field is None:
-            raise RuntimeError(
-                f"MuJoCo {mujoco.__version__} has no {path}; mjhill needs MuJoCo 4.x"
-            )
+            raise RuntimeError(_mismatch(f"has no {path}"))
         total += field.offset
         kind = dict(kind._fields_)[name]
     return total
+
+
+def _mismatch(what: str) -> str:
+    """What is wrong with MuJoCo's structs, and the ways out of it."""
+    return (
+        f"MuJoCo {mujoco.__version__} {what}, so the compiled muscle of mjhill {version('mjhill')} "
+        f"cannot run with it; it was made for MuJoCo {_MADE_FOR}. After an upgrade of mujoco: "
+        "'pip install --upgrade mjhill', or go back with "
+        f"'pip install mujoco=={_MADE_FOR}'. Meanwhile it runs, many times slower, with "
+        'backend="python"'
+    )
 
 
 @cache
 def _struct(name: str) -> Any:
     from mujoco.introspect.structs import STRUCTS
 
+    if name not in STRUCTS:
+        raise RuntimeError(_mismatch(f"has no struct {name}"))
     return type(name, (ctypes.Structure,), {"_fields_": _members(STRUCTS[name].fields)})
 
 
@@ -108,10 +121,7 @@ def verify(model: mujoco.MjModel, data: mujoco.MjData, paths: list[str]) -> None
             kind = ctypes.c_double if isinstance(bound, float) else ctypes.c_int
             good = kind.from_address(start).value == bound
         if not good:
-            raise RuntimeError(
-                f"MuJoCo {mujoco.__version__} keeps {path} elsewhere than its headers say; "
-                'the compiled muscle cannot run: use backend="python" and report this'
-            )
+            raise RuntimeError(_mismatch(f"keeps {path} elsewhere than its own declarations say"))
 
 
 def verify_fields() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import warnings
 from dataclasses import asdict
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mjhill.cli.printing import json_option, print_table
+from mjhill.cli.printing import json_option, print_json, print_line, print_table
 
 if TYPE_CHECKING:
     import mujoco
@@ -38,10 +37,10 @@ def check(model: str, as_json: bool) -> None:
     looked_at = _looked_at(loaded)
     if as_json:
         shown = [asdict(finding) for finding in findings]
-        click.echo(json.dumps({"looked_at": looked_at, "findings": shown}, ensure_ascii=False))
+        print_json({"looked_at": looked_at, "findings": shown})
     else:
         for what, value in looked_at.items():
-            click.echo(f"{what}: {value}")
+            print_line(f"{what}: {value}")
         if findings:
             rows = [
                 {
@@ -54,7 +53,7 @@ def check(model: str, as_json: bool) -> None:
             ]
             print_table(rows, False, title=f"Findings on {model}")
         else:
-            click.echo("no findings")
+            print_line("no findings")
     if any(finding.severe for finding in findings):
         sys.exit(SEVERE)
 

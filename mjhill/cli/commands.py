@@ -2,44 +2,38 @@
 
 from __future__ import annotations
 
-import json
-import sys
+import math
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
 import click
 
 from mjhill.cli.check import check
+from mjhill.cli.group import Group
 from mjhill.cli.identify import identify
-from mjhill.cli.printing import json_option, print_paths, print_table, progress_bar, shown
+from mjhill.cli.printing import (
+    json_option,
+    print_json,
+    print_line,
+    print_paths,
+    print_table,
+    progress_bar,
+    shown,
+)
 from mjhill.cli.reproduce import reproduce
 from mjhill.cli.view import view
 
 _OUT = Path("out")
+_GRAVITY = "The models of these joints have no gravity, as the movements of the paper."
 _SUFFIXES = {"recording": (".csv", ".npz"), "plot": (".png",), "video": (".mp4", ".gif")}
 
 
-class _Group(click.Group):
-    """Turns the errors that mjhill raises for people into one line and an exit code."""
-
-    def invoke(self, ctx: click.Context) -> Any:
-        try:
-            return super().invoke(ctx)
-        except (click.exceptions.Exit, click.exceptions.Abort):
-            raise  # --help ends in one, an interrupt in the other; both are RuntimeErrors
-        except (ValueError, TypeError, KeyError) as error:
-            self._fail(error, code=2)  # the input was wrong
-        except (RuntimeError, OSError) as error:
-            self._fail(error, code=1)  # the machine or the run was
-
-    @staticmethod
-    def _fail(error: Exception, code: int) -> None:
-        message = error.args[0] if isinstance(error, KeyError) else error
-        click.echo(f"error: {message}", err=True)
-        sys.exit(code)
+_OUTPUT_HELP = "The {}; by default out/{}-MODEL.{}."
+_FRAMES = 1_000_000  # of a film, nine hours at 30 a second
 
 
-@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="mjhill")
 def main() -> None:
     """Physiological muscle for MuJoCo: the Hill-based system of Winters & Stark (1987)."""
@@ -51,14 +45,23 @@ main.add_command(reproduce)
 main.add_command(view)
 
 
-def _inputs_option(function: Any) -> Any:
-    return click.option(
+def _inputs_options(function: Any) -> Any:
+    torque = click.option(
+        "--torque",
+        "-t",
+        multiple=True,
+        metavar="JOINT=N·m[@START[:END]]",
+        help="Torque on a joint from outside, on a slide a force in N; several add up.",
+    )
+    excite = click.option(
         "--excite",
         "-e",
         multiple=True,
         metavar="MUSCLE=LEVEL[@START[:END]]",
-        help="Neural input of a muscle, 0 to 1; several add up. Without any: the movement of demo.",
-    )(function)
+        help="Neural input of a muscle, 0 to 1; several add up. Without any, and without "
+        "--torque: the movement of demo.",
+    )
+    return excite(torque(function))
 
 
 @main.command()
@@ -67,13 +70,12 @@ def _inputs_option(function: Any) -> Any:
 def demo(output: Path, as_json: bool) -> None:
     """Run the elbow through its scripted movement; write video, plot and recording."""
     files = {
-        "video": output / "elbow.mp4",
-        "plot": output / "elbow.png",
-        "recording": output / "elbow.csv",
+        "video": output / "demo-elbow.mp4",
+        "plot": output / "demo-elbow.png",
+        "recording": output / "demo-elbow.csv",
     }
     output.mkdir(parents=True, exist_ok=True)
-    recording = _film("elbow", {}, duration=4.0, files=files)
-    _summary(recording, files, as_json)
+    _film("elbow", {}, {}, 4.0, files, as_json)
 
 
 @main.command("list")
@@ -92,6 +94,8 @@ def list_(as_json: bool) -> None:
         for joint in JOINTS.values()
     ]
     print_table(rows, as_json, title="Joints")
+    if not as_json:
+        print_line(_GRAVITY)
 
 
 @main.command()
@@ -100,21 +104,27 @@ def list_(as_json: bool) -> None:
 @json_option
 def info(model: str, mjcf: bool, as_json: bool) -> None:
     """Show the parameters of MODEL, a joint's name or a path, with units and sources."""
-    from mjhill.describe import rows
+    from mjhill.describe import gravity, rows
     from mjhill.mjcf import snippet
 
     if mjcf:
         click.echo(snippet(model))
         return
     print_table(rows(model), as_json, title=model)
+    if not as_json:
+        print_line(f"Gravity: {gravity(model)}")
 
 
 @main.command()
 @click.argument("model")
-@_inputs_option
-@click.option("--torque", "-t", multiple=True, metavar="JOINT=N·m[@START[:END]]")
+@_inputs_options
 @click.option("--duration", "-d", default=4.0, show_default=True, help="Length [s].")
-@click.option("--output", "-o", type=click.Path(path_type=Path), help="Recording, .csv or .npz.")
+@click.option(
+    "--output",
+    "-o",
+    type=click.Path(path_type=Path),
+    help=_OUTPUT_HELP.format("recording, .csv or .npz", "run", "csv"),
+)
 @click.option("--plot", "-p", type=click.Path(path_type=Path), help="Picture, .png.")
 @json_option
 def run(
@@ -127,62 +137,70 @@ def run(
     as_json: bool,
 ) -> None:
     """Run MODEL, a joint's name or a path, and record it."""
-    files = {"recording": output or _OUT / f"{Path(model).stem}.csv"}
+    files = {"recording": output or _OUT / f"run-{Path(model).stem}.csv"}
     if plot:
         files["plot"] = plot
-    _make_default_folder(files)
-    recording = _film(model, _parse(excite), duration, files, torque=_parse(torque))
-    _summary(recording, files, as_json)
+    _film(model, _parse(excite), _parse(torque), duration, files, as_json)
 
 
 @main.command()
 @click.argument("model")
-@_inputs_option
+@_inputs_options
 @click.option("--duration", "-d", default=4.0, show_default=True, help="Length [s].")
-@click.option("--output", "-o", type=click.Path(path_type=Path), help="Film, .mp4 or .gif.")
+@click.option(
+    "--output",
+    "-o",
+    type=click.Path(path_type=Path),
+    help=_OUTPUT_HELP.format("film, .mp4 or .gif", "video", "mp4"),
+)
 @click.option("--fps", default=30.0, show_default=True, help="Frames per second.")
 @click.option("--speed", default=1.0, show_default=True, help="1 is real time, less is slow.")
 @click.option("--size", nargs=2, type=int, default=(1280, 720), show_default=True)
 @click.option("--camera", help="Camera of the model.")
 @json_option
-def video(model: str, excite: tuple[str, ...], as_json: bool, **options: Any) -> None:
+def video(
+    model: str,
+    excite: tuple[str, ...],
+    torque: tuple[str, ...],
+    duration: float,
+    output: Path | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
     """Film MODEL, a joint's name or a path, without a screen."""
-    output = options.pop("output") or _OUT / f"{Path(model).stem}.mp4"
-    files = {"video": output}
-    _make_default_folder(files)
-    duration = options.pop("duration")
-    recording = _film(model, _parse(excite), duration, files, **options)
-    _summary(recording, files, as_json)
+    _check_frames(duration, options["fps"], options["speed"])
+    files = {"video": output or _OUT / f"video-{Path(model).stem}.mp4"}
+    _film(model, _parse(excite), _parse(torque), duration, files, as_json, **options)
 
 
 @main.command()
-@click.argument("model", default="elbow")
-@click.option("--output", "-o", type=click.Path(path_type=Path), default=_OUT / "compare")
+@click.argument("models", nargs=-1, metavar="[MODEL]...")
+@click.option("--output", "-o", type=click.Path(path_type=Path), default=_OUT / "compare",
+              show_default=True, help="Folder, with a folder for each model in it.")  # fmt: skip
 @click.option("--video/--no-video", default=True, show_default=True)
 @click.option("--cost/--no-cost", default=True, show_default=True, help="Time the steps too.")
 @json_option
-def compare(model: str, output: Path, video: bool, cost: bool, as_json: bool) -> None:
-    """Compare MODEL's muscles with MuJoCo's own on the same plant and inputs."""
-    from dataclasses import asdict, replace
+def compare(models: tuple[str, ...], output: Path, video: bool, cost: bool, as_json: bool) -> None:
+    """Compare each MODEL's muscles with MuJoCo's own on the same plant and inputs.
 
+    A MODEL is a joint's name or a path; without any it is the elbow. With --json a list, one item
+    for each model.
+    """
     from mjhill import comparison
 
-    with progress_bar("comparing") as progress:
-        result = comparison.compare(model, progress=progress)
-    if cost:
-        with progress_bar("timing steps") as progress:
-            result = replace(result, cost=comparison.step_cost(model, progress=progress))
-    with progress_bar("writing") as progress:
-        paths = comparison.write(result, output, video=video, progress=progress)
+    models = tuple(dict.fromkeys(models)) or ("elbow",)
+    folders = _folders(models, output)
+    for model in models:
+        comparison.check(model)  # before the first one takes its time
+    results = []
+    for model in models:
+        result, paths = _compare(model, folders[model], video, cost)
+        if as_json:
+            results.append({**result.as_dict(), "files": list(map(str, paths))})
+        else:
+            _print_comparison(result, paths, "" if len(models) == 1 else f"{model}: ")
     if as_json:
-        click.echo(json.dumps(result.as_dict(), ensure_ascii=False))
-        return
-    print_table([asdict(match) for match in result.matching], False, title="What is matched")
-    rows = [{**asdict(row), "ratio": row.ratio} for row in result.rows]
-    print_table(rows, False, title="What differs")
-    if result.cost:
-        print_table([result.cost.as_dict()], False, title="Cost of a step [µs]", across=False)
-    print_paths({path.name: path for path in paths})
+        print_json(results)
 
 
 @main.command()
@@ -204,9 +222,12 @@ def bench(
 ) -> None:
     """Measure accuracy, cost, threads, start and video, or those of NAMES.
 
+    All of them take about 5 minutes on two cores, most of it video, which a graphics card makes
+    shorter. Each table says what was wanted (goal) and whether it was met.
+
     By name only, on two cores: sweep, random systems against the reference solver (2 minutes);
-    fuzz, 100,000 models with anything that is accepted (10 minutes); checks, sound and unsound
-    models past check_model (4 minutes); endurance, 10⁸ steps (3 minutes).
+    fuzz, 100,000 models with anything that is accepted (5 minutes); checks, sound and unsound
+    models past check_model (3 minutes); endurance, 10⁸ steps (3 minutes).
     """
     from mjhill import bench as benchmarks
 
@@ -216,40 +237,91 @@ def bench(
         raise click.UsageError(
             f"--count, --kind and --case go with mjhill bench and one of {listed}"
         )
+    chosen = names if long else benchmarks.check_names(names)
+    if not (count or case):
+        length = benchmarks.length(chosen)
+        print_line(f"{', '.join(chosen)}: {length} on two cores", err=True)
     with progress_bar("measuring") as progress:
         if long:
             results = {long: benchmarks.run_long(long, kind, count, case, progress)}
         else:
             results = benchmarks.run(names, progress)
     if as_json:
-        click.echo(json.dumps({name: result.rows for name, result in results.items()}))
+        print_json({name: result.rows for name, result in results.items()})
         return
-    click.echo(benchmarks.versions())
+    print_line(benchmarks.versions())
     for result in results.values():
         print_table(result.rows, False, title=result.title)
         for note in result.notes:
-            click.echo(f"  {note}")
+            print_line(f"  {note}")
+
+
+def _folders(models: tuple[str, ...], output: Path) -> dict[str, Path]:
+    """A folder for each model, by its name."""
+    folders = {model: output / Path(model).stem for model in models}
+    for model, folder in folders.items():
+        alike = [other for other in models if folders[other] == folder and other != model]
+        if alike:
+            raise ValueError(
+                f"{model} and {alike[0]} would both be written to {folder}; compare them one by "
+                "one, each with an --output of its own"
+            )
+    return folders
+
+
+def _compare(model: str, folder: Path, video: bool, cost: bool) -> tuple[Any, list[Path]]:
+    """Compare one model and write its folder."""
+    from dataclasses import replace
+
+    from mjhill import comparison
+
+    with progress_bar(f"comparing {model}") as progress:
+        result = comparison.compare(model, progress=progress)
+    if cost:
+        with progress_bar(f"timing steps of {model}") as progress:
+            result = replace(result, cost=comparison.step_cost(model, progress=progress))
+    with progress_bar(f"writing {model}") as progress:
+        return result, comparison.write(result, folder, video=video, progress=progress)
+
+
+def _print_comparison(result: Any, paths: list[Path], of: str) -> None:
+    from dataclasses import asdict
+
+    matches = [asdict(match) for match in result.matching]
+    print_table(matches, False, title=f"{of}What is matched")
+    rows = [{**asdict(row), "ratio": row.ratio} for row in result.rows]
+    print_table(rows, False, title=f"{of}What differs")
+    if result.cost:
+        print_table([result.cost.as_dict()], False, f"{of}Cost of a step [µs]", across=False)
+    print_paths({path.name: path for path in paths})
 
 
 def _film(
     model: str,
     excitation: dict[str, Any],
+    torque: dict[str, Any],
     duration: float,
     files: dict[str, Path],
-    torque: dict[str, Any] | None = None,
+    as_json: bool,
     **video: Any,
-) -> Any:
-    """Run a model from its home pose and write what ``files`` names."""
+) -> None:
+    """Run a model from its home pose, write what ``files`` names and print what came out."""
     from mjhill import scripted
     from mjhill.files import check_writable
+    from mjhill.models import load
 
     for kind, path in files.items():
         if path.suffix not in _SUFFIXES[kind]:
             wanted = " or ".join(_SUFFIXES[kind])
             raise ValueError(f"{kind} {str(path)!r} must end in {wanted}")
+    loaded = load(model)
+    for path in files.values():
+        if path.parent == _OUT:
+            _OUT.mkdir(exist_ok=True)
         check_writable(path)
+    replaced = [path for path in files.values() if path.exists()]
     with progress_bar("running") as progress:
-        loaded, recording = scripted.run(model, excitation, torque or {}, duration, progress)
+        recording = scripted.run_loaded(loaded, excitation, torque, duration, progress)
     if "recording" in files:
         recording.save(files["recording"])
     if "plot" in files:
@@ -266,12 +338,17 @@ def _film(
                 progress=lambda done, total: progress(done / total),
                 **video,
             )
-    return recording
+    _summary(recording, files, replaced, as_json)
 
 
-def _make_default_folder(files: dict[str, Path]) -> None:
-    if any(path.parent == _OUT for path in files.values()):
-        _OUT.mkdir(exist_ok=True)
+def _check_frames(duration: float, fps: float, speed: float) -> None:
+    frames = fps * duration / speed if speed > 0 else 0.0  # what is no speed, render refuses
+    if math.isfinite(duration) and frames > _FRAMES:
+        raise ValueError(
+            f"a film of {duration:g} s at {speed:g} times its speed and {fps:g} frames per second "
+            f"has {frames:.4g} frames; at most {_FRAMES:,} are allowed: lower --duration or "
+            "--fps, or raise --speed"
+        )
 
 
 def _parse(items: tuple[str, ...]) -> dict[str, Any]:
@@ -300,14 +377,16 @@ def _parse(items: tuple[str, ...]) -> dict[str, Any]:
     return signals
 
 
-def _summary(recording: Any, files: dict[str, Path], as_json: bool) -> None:
+def _summary(
+    recording: Any, files: dict[str, Path], replaced: Collection[Path], as_json: bool
+) -> None:
     from mjhill.scripted import summary
 
     numbers = summary(recording)
     if as_json:
         paths = {name: str(path) for name, path in files.items()}
-        click.echo(json.dumps({"files": paths, **numbers}, ensure_ascii=False))
+        print_json({"files": paths, "replaced": list(map(str, replaced)), **numbers})
         return
     for name, value in numbers.items():
-        click.echo(f"{name}: {shown(value)}")
-    print_paths(files)
+        print_line(f"{name}: {shown(value)}")
+    print_paths(files, replaced)

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from mjhill.cli.printing import json_option, print_paths, print_table, progress_bar
+from mjhill.cli.printing import json_option, print_json, print_paths, print_table, progress_bar
 from mjhill.files import check_writable, replacing
 
 _HIDDEN = ("note", "source", "muscle")  # from tables on the screen; the JSON file has them
@@ -72,7 +72,7 @@ def identify(
         report = _published(names, parameters, files)
     _write(files["numbers"], json.dumps(report, ensure_ascii=False, indent=1))
     if as_json:
-        click.echo(json.dumps(report, ensure_ascii=False))
+        print_json(report)
         return
     _print(report)
     print_paths(files)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 import click
 
 
@@ -21,5 +19,4 @@ def view(model: str, paused: bool, speed: float) -> None:
     from mjhill.rendering import view as show
 
     loaded = load(model)
-    with suppress(KeyboardInterrupt):
-        show(loaded, paused=paused, speed=speed)
+    show(loaded, paused=paused, speed=speed)

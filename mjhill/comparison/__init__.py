@@ -9,4 +9,5 @@ from mjhill.comparison.native import native_spec as native_spec
 from mjhill.comparison.report import write as write
 from mjhill.comparison.table import Comparison as Comparison
 from mjhill.comparison.table import Row as Row
+from mjhill.comparison.table import check as check
 from mjhill.comparison.table import compare as compare

@@ -140,6 +140,17 @@ def compare(
     )
 
 
+def check(model: str | Path) -> None:
+    """Look whether a model can be compared, which takes no time.
+
+    Raises:
+        ValueError: As ``compare``.
+    """
+    spec = read_spec(model)
+    compiled(native_spec(spec))
+    trials.find_pair(compiled(spec))
+
+
 def _check_inputs(level: float, levels: tuple[float, float], hit: float | None) -> None:
     for name, value in (("level", level), *(("levels", each) for each in levels)):
         if not 0 < value <= 1:

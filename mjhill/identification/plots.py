@@ -14,6 +14,7 @@ from mjhill.identification.evidence import Evidence, evidence_on
 from mjhill.identification.movement import Prediction
 from mjhill.identification.second_order import step_response
 from mjhill.parameters import Joint
+from mjhill.plots import take_literally
 from mjhill.reference import plant_torque
 from mjhill.rendering.bellies import MUSCLE_COLOURS
 
@@ -123,5 +124,6 @@ def _save(figure: Any, path: str | Path) -> None:
     path = Path(path)
     if path.suffix != ".png":
         raise ValueError(f"plot {str(path)!r} must end in .png")
+    take_literally(figure)
     with replacing(path) as partial:
         figure.savefig(partial)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import shutil
 import signal
 import sys
 import threading
@@ -11,7 +13,8 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -88,24 +91,29 @@ class Worker:
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Keep Ctrl-C waiting, from this process and from those that it starts meanwhile.
+    """Keep Ctrl-C and SIGTERM waiting, and Ctrl-C from the processes that are started meanwhile.
 
     Ctrl-C reaches every process of a terminal, and what is to end is for one of them to say.
     """
     waiting: list[int] = []
+    resource_tracker.ensure_running()  # its start, by the first process, would lift the mask again
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # those started inherit it
     # a blocked signal goes to another thread, such as one of a numerical library, and would be
     # raised here all the same
     handled = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGINT, lambda *_: waiting.append(1)) if handled else None
+    before = {
+        number: signal.signal(number, lambda arrived, _: waiting.append(arrived))
+        for number in (signal.SIGINT, signal.SIGTERM)
+        if handled
+    }
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        if handled:
-            signal.signal(signal.SIGINT, before)
-        if waiting:
-            signal.raise_signal(signal.SIGINT)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for arrived in waiting[:1]:
+            signal.raise_signal(arrived)
 
 
 def start(part: Part, workplace: Path, *, fingerprint: str, video: bool) -> Worker:
@@ -127,6 +135,10 @@ def _work(
     part: Part, workplace: Path, fingerprint: str, video: bool, connection: Connection
 ) -> None:
     signal.signal(signal.SIGTERM, _leave)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent to answer
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    threading.Thread(target=_end_with, args=(parent, workplace), daemon=True).start()
     last = 0.0
 
     def progress(share: float) -> None:
@@ -136,14 +148,31 @@ def _work(
             connection.send(float(share))  # fails where the other side is gone, and so ends this
             last = now
 
+    end: Success | Failure
     try:
-        problem = make(part, workplace, fingerprint=fingerprint, video=video, progress=progress)
+        try:
+            end = Success(
+                make(part, workplace, fingerprint=fingerprint, video=video, progress=progress)
+            )
+        except BrokenPipeError:
+            raise
+        except Exception as error:
+            end = Failure(f"{type(error).__name__}: {error}", traceback.format_exc())
+        connection.send(end)
     except BrokenPipeError:
-        sys.exit(1)
-    except Exception as error:
-        connection.send(Failure(f"{type(error).__name__}: {error}", traceback.format_exc()))
-    else:
-        connection.send(Success(problem))
+        sys.exit(1)  # nobody listens any more
+    finally:
+        if not parent.is_alive():
+            shutil.rmtree(workplace, ignore_errors=True)
+
+
+def _end_with(parent: Any, workplace: Path) -> None:
+    """End this process, and remove what it has written, when its parent has been killed."""
+    wait([parent.sentinel])
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(_PATIENCE)
+    shutil.rmtree(workplace, ignore_errors=True)  # it did not listen
+    os._exit(1)
 
 
 def _leave(number: int, frame: FrameType | None) -> None:

@@ -10,6 +10,7 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any
 
+from mjhill import interrupts
 from mjhill.reproduction.catalogue import CATALOGUE, Entry, Part, every_part, select
 from mjhill.reproduction.fingerprint import fingerprint
 from mjhill.reproduction.process import Failure, Worker, start, uninterrupted
@@ -142,6 +143,7 @@ class _Run:
                 self._listen()
             self.progress(1.0)
         except KeyboardInterrupt:
+            interrupts.acknowledge()  # the report comes next
             self.outcome.interrupted = True
             self.outcome.missing |= dict.fromkeys([*self.running, *queue], _INTERRUPTED)
         finally:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mjhill.files import check_writable
+from mjhill.files import check_writable, partial_folder, sweep
 from mjhill.reproduction.catalogue import Part
 
 NUMBERS, FIGURE, FILM = ".json", ".png", ".mp4"
@@ -28,13 +26,14 @@ class Store:
     folder: Path
 
     def open(self) -> None:
-        """Make the folder where it is not there.
+        """Make the folder where it is not there, and remove what a killed run has left in it.
 
         Raises:
             OSError: It cannot be made or written.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         check_writable(self.folder / f"report{NUMBERS}")
+        sweep(self.folder)
 
     def path(self, part: Part, suffix: str) -> Path:
         """Where a file of a part is kept."""
@@ -43,11 +42,8 @@ class Store:
     @contextmanager
     def workplace(self, part: Part) -> Iterator[Path]:
         """A hidden folder to make a part's files in, gone when this returns."""
-        folder = Path(tempfile.mkdtemp(dir=self.folder, prefix=f".{part.name}.", suffix=".partial"))
-        try:
+        with partial_folder(self.folder, part.name) as folder:
             yield folder
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
 
     def keep(self, part: Part, workplace: Path) -> None:
         """Take over the files that a part made, in place of older ones."""
