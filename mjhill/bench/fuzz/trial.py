@@ -271,13 +271,9 @@ def _plant_warns(case: Case) -> bool:
 
 
 def _reported(case: Case) -> str:
-    """What ``record`` says of a run; empty if nothing.
-
-    Where one control is none, MuJoCo takes 0 for all.
-    """
+    """What ``record`` says of a run; empty if nothing."""
     model, timestep = case.model, float(case.model.opt.timestep)
-    good = (np.abs(case.controls) <= mujoco.mjMAXVAL).all(axis=1)
-    inputs = np.where(good[:, None], case.controls, 0.0)
+    inputs = _taken(model, case.controls)
     excitation = {name: _held(inputs[:, at.ctrl], timestep) for name, at in addresses(model)}
     data = _copy(case)
     data.ctrl[:] = inputs[0]
@@ -291,6 +287,16 @@ def _reported(case: Case) -> str:
         except ValueError:  # refused for its inputs, which says nothing of the failure
             return ""
     return ""
+
+
+def _taken(model: mujoco.MjModel, controls: _Values) -> _Values:
+    """Controls as MuJoCo takes them: clamped, then 0 for all where one is still none."""
+    if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL:
+        limited = model.actuator_ctrllimited.astype(bool)
+        clamped = np.clip(controls, *model.actuator_ctrlrange.T)  # NaN stays NaN
+        controls = np.where(limited, clamped, controls)
+    good = (np.abs(controls) <= mujoco.mjMAXVAL).all(axis=1)
+    return np.where(good[:, None], controls, 0.0)
 
 
 def _held(levels: _Values, timestep: float) -> Signal:
