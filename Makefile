@@ -1,8 +1,11 @@
 # make demo, make test: set everything up, then do it. make check: format, lint, types.
 # make models: write the parameters of mjhill/data/joints.toml into models/.
 # make joints: fit that file to the literature first, and write docs/joints.md.
+# make setup VENV=.venv-oldest VERSIONS=oldest: an environment with the oldest dependencies allowed.
 PYTHON ?= python3
 VENV ?= .venv
+VERSIONS ?= newest
+TESTS ?=
 READY := $(VENV)/.ready
 RUN := $(VENV)/bin
 export VENV
@@ -15,7 +18,7 @@ demo: $(READY)
 
 test: $(READY)
 	@.ci/graphics
-	@$(RUN)/pytest -n 2 -q
+	@$(RUN)/pytest -n 2 --dist worksteal -q $(TESTS)
 
 check: $(READY)
 	@$(RUN)/ruff format --check .
@@ -38,9 +41,9 @@ joints: $(READY)
 
 setup: $(READY)
 
-$(READY): pyproject.toml .ci/venv
-	@.ci/venv "$(PYTHON)" "$(VENV)"
+$(READY): pyproject.toml .ci/venv .ci/oldest
+	@.ci/venv "$(PYTHON)" "$(VENV)" $(VERSIONS)
 	@touch $@
 
 clean:
-	rm -rf $(VENV) out build dist
+	rm -rf $(VENV) .venv-newest .venv-oldest out build dist

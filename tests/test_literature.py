@@ -32,7 +32,7 @@ OUTSIDE = {
     ("hip", "passive torque at -20° [N·m]"),
     ("hip", "full effort of hip_extensor ends at [°]"),
 }
-BY_COST = ("knee", "ankle", "elbow", "head", "wrist", "wrist_rotation", "eye", "hip")
+BY_COST = ("knee", "ankle", "head", "wrist", "wrist_rotation", "eye", "hip")
 
 
 def shipped(name):
@@ -49,8 +49,9 @@ def shipped(name):
 # --- the fit
 
 
-def test_every_joint_is_fitted_here():
-    assert set(BY_COST) == set(mjhill.JOINTS)
+def test_every_joint_but_the_elbow_is_fitted_here():
+    # the elbow is in test_readme, which has its fit at hand
+    assert {*BY_COST, "elbow"} == set(mjhill.JOINTS)
 
 
 @pytest.mark.parametrize("name", BY_COST)

@@ -62,11 +62,11 @@ def measured(recording, pick=slice(None)):
     )
 
 
-def held(subject, noise=TORQUE_NOISE):
+def held(subject, noise=TORQUE_NOISE, duration=0.5):
     """The elbow held still by a clamp whose torque is measured."""
     bench = rig(subject, added_inertia=1e9)  # no muscle turns it in the time of a run
     pulse = mjhill.pulse(0.6, 0.1, 0.3)
-    recording = run(bench, still(bench, 1.3), 0.5, excitation={"elbow_flexor": pulse})
+    recording = run(bench, still(bench, 1.3), duration, excitation={"elbow_flexor": pulse})
     muscles = recording["elbow_extensor.force"] - recording["elbow_flexor.force"]
     random = np.random.default_rng(1)
     torque = muscles - plant_torque(subject, 1.3) + noise * random.standard_normal(len(recording))
@@ -160,8 +160,8 @@ def test_two_measurements_tell_more_than_one(subject):
 
 
 def test_each_measurement_may_be_predicted_in_its_own_way(subject):
-    clamp = held(subject)
-    movement = measured(noisy(moved(subject)))
+    clamp = held(subject, duration=0.2)
+    movement = measured(noisy(moved(subject, duration=0.2)))
     _, predictions = from_measurements(
         "elbow", [movement, clamp, clamp], only=["damping"], predict=["angle", "torque", "torque"]
     )

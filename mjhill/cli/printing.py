@@ -48,6 +48,7 @@ def progress_bar(what: str) -> Iterator[Progress]:
     from rich.progress import Progress as Bars
 
     console = Console(stderr=True, emoji=False)
+    console.quiet = not console.is_terminal  # rich before 14.3 prints a line where bars are off
     with Bars(console=console, transient=True, disable=not console.is_terminal) as bars:
         bar = bars.add_task(escape(plain(what)), total=1.0)
 

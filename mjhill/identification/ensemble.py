@@ -89,14 +89,12 @@ def driving_torques(
     result = np.empty((len(joints), len(path)))
     inputs = np.asarray(excitation)
     with installed():
-        batch = _batch(joints, path[0], 0.0, before, timestep)
+        # one thread: a step alone is shorter than it takes to wake the others
+        batch = _batch(joints, path[0], 0.0, before, timestep, threads=1)
+        qpos, qvel, ctrl = batch.qpos, batch.qvel, batch.ctrl
         passive, muscles = batch.bind("qfrc_passive"), batch.bind("qfrc_actuator")
         for step in range(len(path)):
-            batch.qpos[:, 0], batch.qvel[:, 0], batch.ctrl[:] = (
-                path[step],
-                speed[step],
-                inputs[step],
-            )
+            qpos[:, 0], qvel[:, 0], ctrl[:] = path[step], speed[step], inputs[step]
             batch.step()
             result[:, step] = inertial[:, step] - passive[:, 0] - muscles[:, 0]
     check_warnings(batch, joints[0].name)
@@ -109,13 +107,15 @@ def _batch(
     velocity: ArrayLike,
     before: ArrayLike,
     timestep: float,
+    threads: int = 0,
 ) -> mujoco.batch.Batch:
-    """A simulation for each joint, its muscles steady at the start."""
+    """A simulation for each joint, its muscles steady at the start, on all threads by default."""
     spec = joint_spec(joints[0])
     spec.option.timestep = timestep
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT  # there are none to look for
     with without_python_callbacks():
         model = spec.compile()
-    batch = mujoco.batch.Batch(model, nsim=len(joints))
+    batch = mujoco.batch.Batch(model, nsim=len(joints), nthread=threads)
     _expand(batch, joints)
     batch.qpos[:, 0], batch.qvel[:, 0] = start, velocity
     levels = np.broadcast_to(before, (len(joints), len(joints[0].muscles)))
