@@ -16,7 +16,7 @@ NAMES = ("accuracy", "cost", "threads", "start", "video")
 # on two cores without a graphics card
 SECONDS = {"accuracy": 10, "cost": 20, "threads": 10, "start": 30, "video": 230}
 # run by name, one at a time
-LONG = {"sweep": 120, "fuzz": 300, "checks": 150, "endurance": 150}
+LONG = {"sweep": 120, "fuzz": 300, "checks": 150, "endurance": 90}
 
 
 def run(

@@ -227,7 +227,7 @@ def bench(
 
     By name only, on two cores: sweep, random systems against the reference solver (2 minutes);
     fuzz, 100,000 models with anything that is accepted (5 minutes); checks, sound and unsound
-    models past check_model (3 minutes); endurance, 10⁸ steps (3 minutes).
+    models past check_model (3 minutes); endurance, 10⁸ steps (2 minutes).
     """
     from mjhill import bench as benchmarks
 

@@ -125,13 +125,18 @@ def table(outcomes: Sequence[Outcome]) -> Result:
     if len(rows) > 1:
         rows.append(_row("all", outcomes))
     silent = [o for o in outcomes if o.verdict == "silent"]
+    warned = [
+        o
+        for o in outcomes
+        if o.verdict == "reported" and any(failure.startswith("WARN") for failure in o.failures)
+    ]
     kinds = Counter(failure for o in outcomes for failure in o.failures)
     notes = (
         f"{STEPS} steps each; a failure: a warning of MuJoCo, a state that is not finite, n or a "
         f"outside [0, 1], tension below 0 or above {STRONGEST:g} F_max; foretold: with a severe "
         "finding of check_model or check_tendons, or an error of a check",
         "reported: by mjhill.record, which names what no muscle can do and refuses what MuJoCo "
-        "warns of",
+        f"warns of; it warned of {len(warned)} of them",
         "plant: MuJoCo warns of the same run without muscles and elasticities of ours too",
         "failures: " + ", ".join(f"{name} {n}" for name, n in kinds.most_common()),
         f"goal: none silent; there are {len(silent)}",
