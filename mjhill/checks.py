@@ -243,17 +243,17 @@ def _fast_activation(
     timestep = float(model.opt.timestep)
     columns = parameter_columns(model, muscles)
     for what in ("excitation_tau", "activation_tau", "deactivation_tau"):
-        for row in np.flatnonzero(timestep > 2 * columns[what]).tolist():
+        for row in np.flatnonzero(timestep > columns[what]).tolist():
             if what == "excitation_tau" and columns["electrical_stimulation"][row]:
                 continue
             tau = float(columns[what][row])
             yield Finding(
                 f"muscle {names[muscles[row]]!r}",
-                f"timestep over {what} is {timestep / tau:.3g}, past 2, so RK4 slows it down and "
+                f"timestep over {what} is {timestep / tau:.3g}, past 1, so RK4 slows it down and "
                 "the result may be off by 5 %",
-                f"set model.opt.timestep to {2 * tau:.2g} s or less, or another integrator",
+                f"set model.opt.timestep to {tau:.2g} s or less, or another integrator",
                 False,
-                2 * tau,
+                tau,
             )
 
 

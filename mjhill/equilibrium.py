@@ -144,7 +144,9 @@ def _check_muscles(model: mujoco.MjModel, data: mujoco.MjData, muscles: list[int
     inside = ((states[:, :2] >= -ROUNDING) & (states[:, :2] <= 1 + ROUNDING)).all(axis=1)
     good = inside & (stretch >= -slackest) & (torn <= STRONGEST)
     elements = zip(*(columns[name].tolist() for name in _SERIES), strict=True)
-    tensions = [series_force(x, *element)[0] for x, element in zip(stretch, elements, strict=True)]
+    tensions = [
+        series_force(x, *element)[0] for x, element in zip(stretch.tolist(), elements, strict=True)
+    ]
     for row in np.flatnonzero(~(good & (np.array(tensions) <= STRONGEST))).tolist():
         subject = f"muscle {actuator_names(model)[muscles[row]]!r}"
         n, a, s = states[row].tolist()

@@ -112,8 +112,11 @@ class Muscle:
         "w_long", _LENGTH, "Gaussian width of active force above the optimum", (0, 1000)
     )
     max_velocity: float = _quantity(
-        "V_max", _VELOCITY, "shortening velocity without load (eq. 3)", (0, 1e4)
-    )
+        # the slowest muscles shorten by a tenth of their length in a second; a muscle that
+        # is far slower than its joint holds it like a rope, at any force
+        "V_max", _VELOCITY, "shortening velocity without load (eq. 3)",
+        (1e-4, 1e4), low_allowed=True,
+    )  # fmt: skip
     hill_shape: float = _quantity(
         # below 0.05 a muscle holds or slips like a clutch, which no timestep resolves
         "A",
@@ -123,22 +126,31 @@ class Muscle:
         low_allowed=True,
     )
     series_stretch: float = _quantity(
-        "x_max", _LENGTH, "stretch of the series element at F_max (eq. 7)", (0, 100)
-    )
+        # a nanometre; where it is shorter, products of its stiffness overflow
+        "x_max", _LENGTH, "stretch of the series element at F_max (eq. 7)",
+        (1e-9, 100), low_allowed=True,
+    )  # fmt: skip
     series_shape: float = _quantity(
         # above 10 stiffness rises by four powers of ten within the working range
         "S", "-", "shape of the exponential series element (eq. 7)",
         (0.01, 10), default=3.0, low_allowed=True,
     )  # fmt: skip
-    excitation_tau: float = _quantity("τ_nex", "s", "neural excitation, time constant (12)", (0, 1))
-    activation_tau: float = _quantity("τ_act", "s", "activation, time constant (12)", (0, 1))
-    deactivation_tau: float = _quantity("τ_deact", "s", "deactivation, time constant (12)", (0, 1))
+    # below a microsecond nothing is left to resolve, and n - a over it is rounding
+    excitation_tau: float = _quantity(
+        "τ_nex", "s", "neural excitation, time constant (12)", (1e-6, 1), low_allowed=True
+    )
+    activation_tau: float = _quantity(
+        "τ_act", "s", "activation, time constant (12)", (1e-6, 1), low_allowed=True
+    )
+    deactivation_tau: float = _quantity(
+        "τ_deact", "s", "deactivation, time constant (12)", (1e-6, 1), low_allowed=True
+    )
     eccentric_plateau: float = _quantity(
         "P", "-", "force in fast lengthening, in units of isometric force", (1, 3), default=1.3
     )
     eccentric_slope_ratio: float = _quantity(
         "R", "-", "slope of force-velocity just in lengthening over just in shortening",
-        (0, 20), default=1.0,
+        (1e-3, 20), default=1.0, low_allowed=True,
     )  # fmt: skip
     velocity_activation: float = _quantity(
         "κ", "-", "share of V_max that scales with active state: V_max (1 - κ + κ a g)",

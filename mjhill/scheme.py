@@ -25,7 +25,7 @@ from mjhill.elements import (
 
 NEGLIGIBLE = 3e-3  # bend of the equation within a step that needs no correction [F_max]
 TOLERANCE = 1e-3  # correction of a substep that is taken [F_max]
-PATIENCE = 30  # substeps tried, after which any is taken
+PATIENCE = 60  # substeps tried
 
 
 def averages(p: float, q: float) -> tuple[float, float]:
@@ -150,7 +150,10 @@ def linear_change(
     rise = stiffness * change
     excess = force - hypothetical
     # q is the force over which the slope of force-velocity changes by its own size
-    bend = (abs(rise) + abs(gain)) * abs(rise) * (2.0 + abs(change) * (shape / stretch_max))
+    steps = abs(change) * (shape / stretch_max)  # in which force grows e-fold
+    bend = (abs(rise) + abs(gain)) * abs(rise) * (2.0 + steps)
+    if steps > 5.0:  # any force is left out
+        bend += q
     if excess * (excess + rise - gain) < 0:  # the slope jumps where shortening turns to lengthening
         bend += q * abs(rise * (slope_ratio - 1.0))
     return change, rate * q + drift * gain - p * change, q, bend
@@ -179,7 +182,7 @@ def divided_stretch(
     """
     elapsed, part = 0.0, 1.0  # in units of dt
     held = False  # whether the hypothetical force is
-    for trial in range(2 * PATIENCE):
+    for _trial in range(PATIENCE):
         now = before + (after - before) * elapsed
         if stretch < 0:  # slack is taken up at its mean rate, to the moment it is taut
             rate, _, _, _, _, _ = stretch_rate(
@@ -216,15 +219,58 @@ def divided_stretch(
         _, slower = averages(time * min(p / q, new_p / new_q), 1.0)
         held = False
         error = abs(missed) * slower * max(stiffness, new_stiffness)
-        if error > TOLERANCE and trial < PATIENCE:
+        if error > TOLERANCE:
             part *= max(0.1, 0.8 * sqrt(TOLERANCE / error))
             continue
         stretch += change + missed * growing
         elapsed += part
         if elapsed >= 1.0 - 1e-9:
             return stretch
-        part = min(1.0 - elapsed, 4.0 * part) if trial < PATIENCE else 1.0 - elapsed
-    return stretch
+        part = min(1.0 - elapsed, 4.0 * part)
+    return settled_stretch(
+        stretch, length_rate, after, max_velocity, share, hill, plateau, slope_ratio, viscosity,
+        stretch_max, shape, limit, (1.0 - elapsed) * dt,
+    )  # fmt: skip
+
+
+def settled_stretch(
+    stretch: float,
+    length_rate: float,
+    hypothetical: float,
+    max_velocity: float,
+    share: float,
+    hill: float,
+    plateau: float,
+    slope_ratio: float,
+    viscosity: float,
+    stretch_max: float,
+    shape: float,
+    limit: float,
+    dt: float,
+) -> float:
+    """As ``advance_stretch``, to first order, from anywhere: never past the equilibrium.
+
+    Backward Euler, by bisection: the rate falls as the stretch grows, so there is one solution.
+    Where ``divided_stretch`` has lost its patience, any other step may end at any force.
+    """
+    slack_rate, _, _, _, _, _ = stretch_rate(
+        -stretch_max, length_rate, hypothetical, max_velocity, share, hill, plateau, slope_ratio,
+        viscosity, stretch_max, shape, limit,
+    )  # fmt: skip
+    if stretch + dt * slack_rate <= 0.0:
+        return stretch + dt * slack_rate
+    low, high = 0.0, max(stretch, 0.0) + dt * max(slack_rate, 0.0)
+    for _halving in range(60):
+        middle = 0.5 * (low + high)
+        rate, _, _, _, _, _ = stretch_rate(
+            middle, length_rate, hypothetical, max_velocity, share, hill, plateau, slope_ratio,
+            viscosity, stretch_max, shape, limit,
+        )  # fmt: skip
+        if middle < stretch + dt * rate:
+            low = middle
+        else:
+            high = middle
+    return high
 
 
 def staged_stretch(
@@ -335,9 +381,9 @@ def muscle_rates(
         a, active_length_factor(length, optimal, width_short, width_long), floor
     )
     if staged:
-        least = 0.5 * dt  # RK4 is unstable past 2.78/dt
-        n_rate = (u - n) / dt if stimulated > 0 else excitation_rate(u, n, max(tau_nex, least))
-        a_rate = activation_rate(source, a, max(tau_act, least), max(tau_deact, least))
+        # where stages relax faster than 1/dt they overshoot: n and a would leave [0, 1]
+        n_rate = (u - n) / dt if stimulated > 0 else excitation_rate(u, n, max(tau_nex, dt))
+        a_rate = activation_rate(source, a, max(tau_act, dt), max(tau_deact, dt))
         _, rate = staged_stretch(
             length - s, length_rate, now, max_velocity, velocity_share, hill, plateau,
             slope_ratio, viscosity, stretch_max, shape, limit, dt,
@@ -350,7 +396,8 @@ def muscle_rates(
     length_then = length - dt * length_rate
     a_then = a - (n - a) * (dt / tau)
     if stimulated > 0:  # n is the input of the step before, so it can be undone exactly
-        a_then = n + (a - n) * exp(dt / (tau_act if n >= a else tau_deact))
+        decays = dt / (tau_act if n >= a else tau_deact)
+        a_then = n + (a - n) * exp(min(decays, 500.0))  # past 700 it overflows
         a_then = min(max(a_then, 0.0), 1.0)
     then = hypothetical_force(
         a_then, active_length_factor(length_then, optimal, width_short, width_long), floor

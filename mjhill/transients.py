@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mjhill.equilibrium import STRONGEST
 from mjhill.parameters import Muscle
 from mjhill.recording import Recording
 
@@ -67,7 +68,8 @@ def transients(recording: Recording) -> tuple[Transient, ...]:
     """Moments in which muscles of ours did what no muscle can, at most one of each kind for each.
 
     - *force*: more than the contractile element can hold, F_max times the eccentric plateau and
-      what its viscosity adds at the fastest lengthening that the joints have yet made.
+      what its viscosity adds at the fastest lengthening that the joints have yet made; in no case
+      more than 3 F_max, at which a muscle tears.
     - *velocity*: the contractile element shortens faster than 1.5 V_max, or lengthens faster than
       that without a cause.
     - *push*: a force below 0.
@@ -106,11 +108,13 @@ def _of_muscle(recording: Recording, name: str, muscle: Muscle) -> Iterator[Tran
     carried = muscle.max_isometric_force * (
         _MARGIN * muscle.eccentric_plateau + muscle.viscosity * stretched
     )
+    held = carried
+    carried = np.minimum(carried, STRONGEST * muscle.max_isometric_force)
     checks = {  # values, what they have too much, what is possible
         "force": (tension, tension - carried, carried),
         "velocity": (
             velocity,
-            np.maximum(velocity, -velocity - _explained(recording, name, tension <= carried))
+            np.maximum(velocity, -velocity - _explained(recording, name, tension <= held))
             - fastest,
             np.copysign(fastest, velocity),
         ),
@@ -123,6 +127,9 @@ def _of_muscle(recording: Recording, name: str, muscle: Muscle) -> Iterator[Tran
             continue
         worst = int(np.argmax(np.where(beyond, np.nan_to_num(excess, nan=np.inf), -np.inf)))
         cause, remedy = _reason(kind, worst, jumped)
+        if kind == "force" and tension[worst] <= held[worst]:
+            cause = f"it is lengthened at up to {stretched[worst]:.3g} times V_max, which tears it"
+            remedy = "look for an inertia, a speed or a max_velocity that is too small or too large"
         yield Transient(
             name, kind, float(recording.time[worst]), float(values[worst]), float(limits[worst]),
             recording.units[f"{name}.{'velocity' if kind == 'velocity' else 'force'}"],

@@ -56,7 +56,7 @@ def test_a_parameter_out_of_bounds_in_the_model_is_named_with_its_muscle(pair):
     pair.actuator_dynprm[1, 2] = -0.01
     with pytest.raises(
         ValueError,
-        match=r"muscle 'elbow_extensor': activation_tau must be in \(0, 1\] s, got -0.01",
+        match=r"muscle 'elbow_extensor': activation_tau must be in \[1e-06, 1\] s, got -0.01",
     ):
         mjhill.check_model(pair)
 
@@ -106,7 +106,7 @@ def test_rk4_warns_of_a_time_constant_that_it_cannot_follow(elbow, muscle):
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     [finding] = [f for f in mjhill.check_model(model) if "tau" in f.problem]
     assert str(finding).startswith("muscle 'elbow_flexor': timestep over excitation_tau is 3.33")
-    assert finding.timestep == pytest.approx(3e-3)
+    assert finding.timestep == pytest.approx(1.5e-3)
 
 
 def light(elbow, share):
@@ -145,8 +145,7 @@ def test_without_yielding_the_limit_is_that_of_an_oscillator(elbow):
     model = light(elbow, 1.0)
     model.dof_damping[:] = 0.0
     muscles = mjhill.layout.read_muscles(model)
-    for name, muscle in muscles.items():
-        mjhill.write_muscle(model, name, dataclasses.replace(muscle, max_velocity=1e-9))
+    model.actuator_biasprm[:, 0] = 1e-9  # V_max, slower than any muscle that is allowed
     [plant] = Plant.parts(model)
     stiffness = sum(
         m.max_isometric_force * m.series_shape / m.series_stretch / (1 - math.exp(-m.series_shape))

@@ -201,3 +201,83 @@ def test_electrical_stimulation_skips_the_lag_of_excitation():
         assert states[1.0][0] == pytest.approx(1.0)
         assert states[1.0][1] == pytest.approx(1 - math.exp(-5e-3 / 0.011), rel=0.1)
         assert states[1.0][1] > 5 * states[0.0][1]
+
+
+def wild_muscles(count):
+    """Parameters of ``advance_stretch`` from anywhere in their ranges, and a timestep."""
+    random = np.random.default_rng(7)
+
+    def log(low, high):
+        return float(np.exp(random.uniform(math.log(low), math.log(high))))
+
+    for _ in range(count):
+        contractile = (
+            log(0.01, 1e4), float(random.uniform(0, 1)), log(0.05, 10),
+            float(random.uniform(1.01, 3)), log(1e-3, 20), log(1e-6, 1),
+        )  # fmt: skip
+        series = log(1e-6, 1), log(0.01, 10), float(random.uniform(1, 10))
+        yield contractile, series, log(1e-6, 1), log(1e-4, 1e-2)
+
+
+def test_a_muscle_that_is_held_never_goes_past_its_equilibrium():
+    for contractile, series, hypothetical, dt in wild_muscles(300):
+        rest = elements.series_stretch_at(hypothetical, *series)
+        for start in (0.0, 0.3 * rest, 1.001 * rest, elements.series_stretch_at(2.9, *series)):
+            for advance_any in (scheme.advance_stretch, scheme.settled_stretch):
+                forces = (hypothetical,) * (2 if advance_any is scheme.advance_stretch else 1)
+                end = advance_any(start, 0.0, *forces, *contractile, *series, dt)
+                force = elements.series_force(end, *series)[0]
+                first = elements.series_force(start, *series)[0]
+                low, high = min(first, hypothetical), max(first, hypothetical)
+                # a step that is not divided may leave out 3e-3, and some of them add up
+                assert low - 0.02 <= force <= high + 0.02, (contractile, series, dt, start)
+
+
+def test_the_last_resort_of_a_step_is_backward_euler():
+    for contractile, series, hypothetical, dt in wild_muscles(200):
+        for rate in (-1.0, 0.0, 0.5):
+            start = elements.series_stretch_at(0.5, *series)
+            end = scheme.settled_stretch(start, rate, hypothetical, *contractile, *series, dt)
+            # x - start - dt rate(x) rises through 0 at the end, within the bits of x
+            below, above = (
+                x
+                - start
+                - dt * scheme.stretch_rate(x, rate, hypothetical, *contractile, *series)[0]
+                for x in (end - 1e-9 * abs(end) - 1e-15, end + 1e-9 * abs(end) + 1e-15)
+            )
+            assert below <= 0 <= above
+
+
+@pytest.mark.parametrize("stimulated", [0.0, 1.0])
+def test_excitation_and_activation_stay_inside_0_and_1_under_rk4(stimulated):
+    random = np.random.default_rng(3)
+    dt = 5e-3
+    muscle = (0.0, 0.5, 0.5, 0.1, 3.0, 2.0, 6.0, 0.3, 1.3, 1.0, 1e-3, 0.0)  # the rest of it
+    for _ in range(100):
+        taus = np.exp(random.uniform(math.log(1e-6), 0, 3)).tolist()
+
+        def rates(n, a, u, taus=taus):
+            found = scheme.muscle_rates(
+                True, u, n, a, 0.0, 0.0, 0.0, dt, *taus, stimulated, 1e-3, *muscle
+            )
+            return np.array(found[:2])
+
+        state = np.array([0.0, 0.0])
+        for _ in range(60):
+            u = float(random.choice([0.0, 1.0]))
+            k1 = rates(*state, u)
+            k2 = rates(*(state + 0.5 * dt * k1), u)
+            k3 = rates(*(state + 0.5 * dt * k2), u)
+            k4 = rates(*(state + dt * k3), u)
+            state = state + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            assert (state >= -1e-12).all()
+            assert (state <= 1 + 1e-12).all()
+
+
+def test_the_shortest_time_constants_overflow_nothing_under_stimulation():
+    muscle = (0.0, 0.5, 0.5, 0.1, 3.0, 2.0, 6.0, 0.3, 1.3, 1.0, 1e-3, 0.0)
+    for n, a in ((0.5, 0.5), (1.0, 0.0), (0.0, 1.0)):
+        rates = scheme.muscle_rates(
+            False, 0.7, n, a, 0.0, 0.01, 0.0, 1e-2, 1e-6, 1e-6, 1e-6, 1.0, 1e-3, *muscle
+        )
+        assert all(map(math.isfinite, rates))

@@ -53,22 +53,20 @@ def test_a_tendon_that_slips_off_its_wrap_is_named_with_muscle_time_and_remedy()
     inputs = {"excitation": {"puller": 0.1}, "torque": {"joint": 30.0}}
     with mjhill.installed(), pytest.warns(RuntimeWarning) as warned:
         run = mjhill.record(model, data, duration=0.02, **inputs)
-    force, velocity = mjhill.transients(run)
-    assert [str(each.message) for each in warned] == [str(force), str(velocity)]
+    (velocity,) = mjhill.transients(run)
+    assert [str(each.message) for each in warned] == [str(velocity)]
     jump = np.argmax(np.diff(run["puller.length"])) + 1
     assert np.diff(run["puller.length"]).max() > 0.01
-    assert (force.kind, force.muscle, force.unit) == ("force", "puller", "N")
-    assert force.time == run.time[jump]
-    assert force.value == run["puller.force"][jump] > 2 * PULLER.max_isometric_force
-    assert force.limit < 1.5 * PULLER.max_isometric_force
-    assert (velocity.kind, velocity.unit) == ("velocity", "m/s")
+    # it is pulled out by the jump within a step, and its force is that of the plateau again
+    assert run["puller.force"].max() < 0.05 * PULLER.max_isometric_force
+    assert (velocity.kind, velocity.muscle, velocity.unit) == ("velocity", "puller", "m/s")
+    assert velocity.time == run.time[jump]
     assert velocity.value < -10 * PULLER.max_velocity
     assert velocity.limit == -1.5 * PULLER.max_velocity
-    for finding in (force, velocity):
-        assert "muscle 'puller' did what no muscle can at 0.00" in str(finding)
-        assert "slips off the geom that it wraps" in finding.cause
-        assert "sidesite" in finding.remedy
-        assert "\n" not in str(finding)
+    assert "muscle 'puller' did what no muscle can at 0.00" in str(velocity)
+    assert "slips off the geom that it wraps" in velocity.cause
+    assert "sidesite" in velocity.remedy
+    assert "\n" not in str(velocity)
 
 
 def test_the_same_tendon_that_stays_on_its_wrap_is_no_finding():
@@ -144,6 +142,18 @@ def test_a_name_that_would_control_a_terminal_is_escaped(pair, muscle):
     (found,) = mjhill.transients(bad)
     assert str(found).isprintable()
     assert r"muscle 'a\x1b[2J\nb'" in str(found)
+
+
+def test_a_muscle_torn_by_its_joint_is_named_though_its_elements_would_carry_the_force(elbow):
+    name = "elbow_extensor"
+    slow = replace(elbow.muscles[name], max_velocity=0.01, viscosity=0.01)
+    model = joint_spec(replace(elbow, muscles={**elbow.muscles, name: slow})).compile()
+    load = {"elbow": 5 * slow.max_isometric_force}
+    with mjhill.installed(), pytest.warns(RuntimeWarning, match="did what no muscle can"):
+        run = mjhill.record(model, rest(model), duration=0.1, torque=load)
+    (found,) = [f for f in mjhill.transients(run) if f.muscle == name and f.kind == "force"]
+    assert found.value > found.limit == 3 * slow.max_isometric_force
+    assert "times V_max, which tears it" in found.cause
 
 
 @pytest.mark.parametrize("integrator", ["IMPLICITFAST", "RK4"])

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import platform
 from collections.abc import Callable
 from importlib import import_module
 from importlib.metadata import version
+from typing import cast
 
 from mjhill.bench.result import Result
 
-NAMES = ("accuracy", "cost", "threads", "start", "video")  # and sweep, which takes longer
+NAMES = ("accuracy", "cost", "threads", "start", "video")
 # on two cores without a graphics card
 SECONDS = {"accuracy": 10, "cost": 20, "threads": 10, "start": 30, "video": 230}
+# run by name, one at a time
+LONG = {"sweep": 120, "fuzz": 300, "checks": 150, "endurance": 90}
 
 
 def run(
@@ -32,6 +36,29 @@ def run(
     return results
 
 
+def run_long(
+    name: str,
+    kinds: tuple[str, ...] = (),
+    count: int | None = None,
+    case: str | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """Run a benchmark that takes minutes, one of ``LONG``; see its ``measure``.
+
+    Raises:
+        ValueError: It has no such kind, case or option.
+    """
+    measure = import_module(f"mjhill.bench.{name}").measure
+    options = {"kinds": kinds, "count": count, "case": case}
+    known = inspect.signature(measure).parameters
+    for option, value in options.items():
+        if value and option not in known:
+            word = {"kinds": "--kind"}.get(option, f"--{option}")
+            raise ValueError(f"{word} does not go with mjhill bench {name}")
+    given = {option: value for option, value in options.items() if option in known}
+    return cast(Result, measure(**given, progress=progress))
+
+
 def check_names(names: tuple[str, ...]) -> tuple[str, ...]:
     """The benchmarks that are asked for, all without any.
 
@@ -40,13 +67,16 @@ def check_names(names: tuple[str, ...]) -> tuple[str, ...]:
     """
     for name in names:
         if name not in NAMES:
-            raise ValueError(f"unknown benchmark {name!r}; there are: {', '.join(NAMES)}")
+            raise ValueError(
+                f"unknown benchmark {name!r}; there are: {', '.join(NAMES)}"
+                f"; by themselves: {', '.join(LONG)}"
+            )
     return names or NAMES
 
 
 def length(names: tuple[str, ...]) -> str:
     """How long benchmarks take on two cores, in words."""
-    seconds = sum(SECONDS[name] for name in names)
+    seconds = sum((SECONDS | LONG)[name] for name in names)
     return f"about {seconds} s" if seconds < 90 else f"about {round(seconds / 60)} minutes"
 
 

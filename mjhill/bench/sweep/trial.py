@@ -116,7 +116,7 @@ def _fine(case: Case, timestep: float) -> tuple[_Values, _Values]:
     """
     use(case.model, "RK4", timestep)
     every = round(SAMPLE / timestep)
-    positions, sensed = _rollout(case.model, at_start(case), _inputs(case, timestep))
+    positions, sensed = _rollout(case.model, at_start(case), inputs_of(case, timestep))
     return positions[::every], -np.vstack([sensed, sensed[-1]])[::every]
 
 
@@ -126,14 +126,15 @@ def use(model: mujoco.MjModel, integrator: str, timestep: float) -> None:
     model.opt.timestep = timestep
 
 
-def run(case: Case, integrator: str, timestep: float) -> _Values:
+def run(case: Case, integrator: str, timestep: float, every: int | None = None) -> _Values:
     """Positions at multiples of ``SAMPLE`` or of the timestep, whichever is longer.
 
-    Shape (T, nq). Callbacks must be installed. From where MuJoCo warns, positions are NaN.
+    Or at each ``every``-th step. Shape (T, nq). Callbacks must be installed. From where MuJoCo
+    warns, positions are NaN.
     """
     use(case.model, integrator, timestep)
-    positions, _ = _rollout(case.model, at_start(case), _inputs(case, timestep))
-    return positions[:: round(SAMPLE / timestep) or 1]
+    positions, _ = _rollout(case.model, at_start(case), inputs_of(case, timestep))
+    return positions[:: every or round(SAMPLE / timestep) or 1]
 
 
 def error(truth: Truth, found: _Values) -> float:
@@ -157,7 +158,7 @@ def floor(truth: Truth, integrator: str, timestep: float) -> _Values:
     model = copy(case.model)
     use(model, integrator, timestep)
     data = at_start(case)
-    inputs = _inputs(case, timestep)
+    inputs = inputs_of(case, timestep)
     every = round(timestep / SAMPLE)
     for column, name in enumerate(case.tonic):
         at = address(model, name)
@@ -178,7 +179,7 @@ def stretched(case: Case, integrator: str, timestep: float) -> _Values:
     """
     use(case.model, integrator, timestep)
     data = at_start(case)
-    inputs = _inputs(case, timestep)
+    inputs = inputs_of(case, timestep)
     outs = [address(case.model, name).out for name in case.tonic]
     steps = round(DURATION / timestep)
     forces = np.empty((steps + 1, len(outs)))
@@ -205,7 +206,7 @@ def at_start(case: Case) -> mujoco.MjData:
     return data
 
 
-def _inputs(case: Case, timestep: float) -> _Values:
+def inputs_of(case: Case, timestep: float) -> _Values:
     """Controls and applied forces of each step, their values of mid-step."""
     model = case.model
     times = (np.arange(round(DURATION / timestep)) + 0.5) * timestep
