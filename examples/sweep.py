@@ -7,7 +7,7 @@ import mujoco.batch
 import numpy as np
 
 import mjhill
-from mjhill.layout import SLOTS
+from mjhill.engine.layout import SLOTS
 
 STRENGTHS = np.linspace(20, 100, 32)  # [N·m]
 INPUTS = np.linspace(0.05, 1.0, 32)  # [-]

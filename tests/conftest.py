@@ -7,8 +7,8 @@ import mujoco
 import pytest
 
 import mjhill
-from mjhill.callbacks.slots import mujoco_library
-from mjhill.spec import joint_spec
+from mjhill.engine.callbacks import mujoco_library
+from mjhill.engine.spec import joint_spec
 
 CALLBACKS = ("mjcb_act_dyn", "mjcb_act_bias", "mjcb_passive")
 
@@ -47,7 +47,7 @@ def elbow() -> mjhill.Joint:
 
 
 @pytest.fixture
-def muscle(elbow: mjhill.Joint) -> mjhill.Muscle:
+def muscle(elbow: mjhill.Joint) -> mjhill.Hill:
     return elbow.muscles["elbow_flexor"]
 
 

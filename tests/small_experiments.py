@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 
 from mjhill import JOINTS
-from mjhill.experiments.bench.rig import rig, run, still, strongest_angle
 from mjhill.experiments.result import Claim, Measure, Result
-from mjhill.recording import Recording
-from mjhill.reproduction import Entry
+from mjhill.lab.rig import rig, run, still, strongest_angle
+from mjhill.report import Entry
+from mjhill.simulate.recording import Recording
 
 HOSTILE = "<script>alert(1)</script> & \"quoted\" 'text' {{ 7 * 7 }}"
 

@@ -217,8 +217,8 @@ def test_inputs_that_add_up_to_one_are_taken():
 
 
 def test_a_benchmark_says_how_long_it_takes_and_which_goals_are_met(monkeypatch):
-    monkeypatch.setattr("mjhill.bench.threads.SIMULATIONS", 8)
-    monkeypatch.setattr("mjhill.bench.threads.ROUNDS", 3)
+    monkeypatch.setattr("mjhill.benchmarks.threads.SIMULATIONS", 8)
+    monkeypatch.setattr("mjhill.benchmarks.threads.ROUNDS", 3)
     result = invoke("bench", "threads")
     assert result.stderr == "threads: about 10 s on two cores\n"
     head = next(line for line in result.stdout.splitlines() if "goal" in line)

@@ -9,9 +9,9 @@ import pytest
 from conftest import rest
 
 import mjhill
-from mjhill.identification.ensemble import angles, driving_torques
-from mjhill.reference import plant_torque
-from mjhill.spec import joint_spec
+from mjhill.engine.spec import joint_spec
+from mjhill.lab.ensemble import angles, driving_torques
+from mjhill.simulate.reference import plant_torque
 
 STEPS = 300
 TIME = np.arange(STEPS + 1) * 1e-3

@@ -7,16 +7,16 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.linear_elements import (
+from mjhill.experiments.paper.external_impulse import external_impulse
+from mjhill.experiments.trials.hit import Hammer
+from mjhill.experiments.trials.neural_burst import hit_with_burst
+from mjhill.lab.linear_elements import (
     contractile_viscosity,
     linear_elements,
     series_stiffness,
 )
-from mjhill.experiments.bench.posture import balanced
-from mjhill.experiments.bench.rig import UnmeasuredError
-from mjhill.experiments.paper.external_impulse import external_impulse
-from mjhill.experiments.trials.hit import Hammer
-from mjhill.experiments.trials.neural_burst import hit_with_burst
+from mjhill.lab.posture import balanced
+from mjhill.lab.rig import UnmeasuredError
 
 
 @pytest.fixture(scope="module")

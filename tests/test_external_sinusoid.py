@@ -7,10 +7,10 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.drives import Drive
-from mjhill.experiments.bench.rig import UnmeasuredError, muscle_torque, net_torque, rig
 from mjhill.experiments.paper.external_sinusoid import external_sinusoid
 from mjhill.experiments.trials.sinusoids import Curve, shaken
+from mjhill.lab.drives import Drive
+from mjhill.lab.rig import UnmeasuredError, muscle_torque, net_torque, rig
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,12 @@ import pytest
 from made_joint import MUSCLE
 
 import mjhill
-from mjhill.experiments.bench.posture import holding
-from mjhill.experiments.bench.rig import (
+from mjhill.experiments.trials.free_velocity import free_velocity
+from mjhill.experiments.trials.impedance import held_impedance, passive_stiffness, stiffness_slope
+from mjhill.experiments.trials.muscle_twitch import muscle_twitch
+from mjhill.experiments.trials.turn import turn
+from mjhill.lab.posture import holding
+from mjhill.lab.rig import (
     UnmeasuredError,
     angles,
     muscle_torque,
@@ -19,12 +23,8 @@ from mjhill.experiments.bench.rig import (
     still,
     strongest_angle,
 )
-from mjhill.experiments.trials.free_velocity import free_velocity
-from mjhill.experiments.trials.impedance import held_impedance, passive_stiffness, stiffness_slope
-from mjhill.experiments.trials.muscle_twitch import muscle_twitch
-from mjhill.experiments.trials.turn import turn
-from mjhill.identification.facts import Fact, facts, read_entries
-from mjhill.reference import plant_torque
+from mjhill.literature.facts import Fact, facts, read_entries
+from mjhill.simulate.reference import plant_torque
 
 NO_ELASTICITY = mjhill.Passive(k1_pos=0.0, k2_pos=1.0, k1_neg=0.0, k2_neg=1.0)
 
@@ -41,7 +41,7 @@ source = "none"
 """
 
 
-def make_joint(muscle: mjhill.Muscle = MUSCLE, **changes) -> mjhill.Joint:
+def make_joint(muscle: mjhill.Hill = MUSCLE, **changes) -> mjhill.Joint:
     return made_joint.make_joint(muscle, **{"passive": NO_ELASTICITY, **changes})
 
 

@@ -7,13 +7,13 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.rest import resting_angle
-from mjhill.experiments.bench.rig import UnmeasuredError
-from mjhill.experiments.bench.variants import AS_IT_IS, FAST
 from mjhill.experiments.paper.free_pulse import FreePulse, free_pulse
 from mjhill.experiments.trials.pulses import ratio_at, ratio_over_time
-from mjhill.reference import rest_state, simulate
-from mjhill.signals import pulse
+from mjhill.lab.rest import resting_angle
+from mjhill.lab.rig import UnmeasuredError
+from mjhill.lab.variants import AS_IT_IS, FAST
+from mjhill.simulate.reference import rest_state, simulate
+from mjhill.simulate.signals import pulse
 
 
 @cache

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from mjhill.experiments.bench.frequency import (
+from mjhill.lab.frequency import (
     SecondOrderFrequency,
     decibel,
     fit_second_order,

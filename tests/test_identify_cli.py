@@ -7,8 +7,8 @@ from click.testing import CliRunner
 
 import mjhill
 from mjhill.cli import main
-from mjhill.experiments.bench.rig import rig, run, still
-from mjhill.joints import parameter_file, read_joints
+from mjhill.joints.reader import parameter_file, read_joints
+from mjhill.lab.rig import rig, run, still
 
 FILES = ["hip.png", "identify.json", "joints.toml", "report.md"]
 

@@ -7,9 +7,9 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.rig import UnmeasuredError
 from mjhill.experiments.paper.isotonic import BOTH, INERTIA, NAIVE, Isotonic, isotonic
 from mjhill.experiments.trials.quick_release import RELEASE, own_curve
+from mjhill.lab.rig import UnmeasuredError
 
 
 @cache

@@ -6,8 +6,8 @@ from conftest import PLAIN_XML
 
 import mjhill
 from mjhill.comparison.native import native_spec
-from mjhill.layout import RATE_PARAMETERS, SLOTS
-from mjhill.spec import joint_spec
+from mjhill.engine.layout import RATE_PARAMETERS, SLOTS
+from mjhill.engine.spec import joint_spec
 
 
 def test_a_muscle_is_read_back_as_it_was_added(pair, elbow):

@@ -7,8 +7,8 @@ from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.rig import muscle_torque
 from mjhill.experiments.paper.lengthening import lengthening
+from mjhill.lab.rig import muscle_torque
 
 EVEN = replace(MUSCLE, width_short=50.0, width_long=50.0)  # as strong at any angle
 ONE = {"velocities": [3.0], "levels": [1.0]}

@@ -14,7 +14,7 @@ from mjhill.identification.identified import Identified
 from mjhill.identification.literature import from_literature
 from mjhill.identification.solve import Estimate
 from mjhill.identification.writing import parameter_text, rounded, write_parameters
-from mjhill.joints import parameter_file, read_joints
+from mjhill.joints.reader import parameter_file, read_joints
 
 # what the joints as a whole do not reach
 OUTSIDE = {

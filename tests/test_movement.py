@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.experiments.bench.rig import rig, run, still
 from mjhill.identification.free import value_of
 from mjhill.identification.measurement import Measurement, read_measurement
 from mjhill.identification.movement import from_measurements
-from mjhill.reference import plant_torque
+from mjhill.lab.rig import rig, run, still
+from mjhill.simulate.reference import plant_torque
 
 NOISE = 0.003  # [rad], that of optical motion capture
 TORQUE_NOISE = 0.3  # [N·m]

@@ -35,7 +35,7 @@ def test_the_wheel_alone_runs_the_elbow(tmp_path):
     assert moved == "True"
     assert (site / "mjhill" / "py.typed").exists()
     assert (site / "mjhill" / "models" / "elbow" / "elbow.xml").exists()
-    assert (site / "mjhill" / "reproduction" / "template.html").exists()
+    assert (site / "mjhill" / "report" / "template.html").exists()
     assert (site / "mjhill" / "reproduction" / "style.css").exists()
 
 

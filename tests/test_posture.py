@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.experiments.bench.posture import (
+from mjhill.lab.posture import (
     balanced,
     check_ascending,
     held_levels,
@@ -16,7 +16,7 @@ from mjhill.experiments.bench.posture import (
     stay,
     steadiest,
 )
-from mjhill.experiments.bench.rig import UnmeasuredError, angles, net_torque, rig, still
+from mjhill.lab.rig import UnmeasuredError, angles, net_torque, rig, still
 
 
 def symmetric(optimum):

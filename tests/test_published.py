@@ -4,14 +4,14 @@ from types import MappingProxyType
 import pytest
 
 import mjhill
-from mjhill.experiments.bench.rig import muscle_torque, rig, run, still
-from mjhill.identification.published import (
+from mjhill.lab.rig import muscle_torque, rig, run, still
+from mjhill.literature.published import (
     EndAngle,
     PassiveTorque,
     end_angles,
     passive_torques,
 )
-from mjhill.reference import plant_torque
+from mjhill.simulate.reference import plant_torque
 
 TORQUES = [item for name in mjhill.JOINTS for item in passive_torques(name)]
 ENDS = [item for name in mjhill.JOINTS for item in end_angles(name)]

@@ -17,11 +17,11 @@ from small_experiments import HOSTILE, entry
 
 import mjhill
 from mjhill.cli import main
-from mjhill.reproduction import CATALOGUE, Entry, report_of, reproduce, select, write_report
-from mjhill.reproduction.fingerprint import sources
-from mjhill.reproduction.part import film_speed
-from mjhill.reproduction.process import uninterrupted
-from mjhill.reproduction.words import difference, duration, number, published
+from mjhill.report import CATALOGUE, Entry, report_of, reproduce, select, write_report
+from mjhill.report.fingerprint import sources
+from mjhill.report.part import film_speed
+from mjhill.report.process import uninterrupted
+from mjhill.report.words import difference, duration, number, published
 
 TESTS = Path(__file__).parent
 
@@ -163,7 +163,7 @@ INTERRUPTED = """
 import sys
 from small_experiments import entry
 from mjhill.interrupts import handled
-from mjhill.reproduction import report_of, reproduce, write_report
+from mjhill.report import report_of, reproduce, write_report
 catalogue = (entry("rise"), entry("endless"), entry("rise", id="last"))
 with handled():
     outcome = reproduce(sys.argv[1], catalogue=catalogue, jobs=1)

@@ -4,11 +4,11 @@ import pytest
 from conftest import rest
 
 import mjhill
-from mjhill.callbacks.python import control
-from mjhill.readings import shortening_velocity, tension
-from mjhill.spec import joint_spec
+from mjhill.engine.python import control
+from mjhill.engine.spec import joint_spec
+from mjhill.muscles.readings import shortening_velocity, tension
 
-STRONG = mjhill.Muscle(
+STRONG = mjhill.Hill(
     max_isometric_force=100.0,
     optimal_length=0.0,
     width_short=0.2,

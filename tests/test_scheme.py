@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from mjhill import elements, scheme
+from mjhill import elements
+from mjhill.muscles import scheme
 
 CE = dict(max_velocity=20.0, hill=0.3, plateau=1.3, slope_ratio=1.0, viscosity=1e-3)
 SE = dict(stretch_max=0.3, shape=3.0, limit=2.0)

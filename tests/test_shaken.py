@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.experiments.bench.drives import Drive
-from mjhill.experiments.bench.dynamometry import runs, stiff_machine
-from mjhill.experiments.bench.rig import UnmeasuredError, rig
 from mjhill.experiments.trials.sinusoids import shaken
+from mjhill.lab.drives import Drive
+from mjhill.lab.dynamometry import runs, stiff_machine
+from mjhill.lab.rig import UnmeasuredError, rig
 
 
 @pytest.fixture

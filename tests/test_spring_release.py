@@ -7,10 +7,10 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.posture import balanced
-from mjhill.experiments.bench.rig import UnmeasuredError
 from mjhill.experiments.paper.spring_release import spring_release
 from mjhill.experiments.trials.spring_trial import release
+from mjhill.lab.posture import balanced
+from mjhill.lab.rig import UnmeasuredError
 
 
 @pytest.fixture(scope="module")

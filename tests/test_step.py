@@ -7,11 +7,11 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.variants import AS_IT_IS, FLAT, LINEAR
+from mjhill.analysis.second_order import step_response
 from mjhill.experiments.paper.step import Step, step
 from mjhill.experiments.trials.step_fit import fitted_step
-from mjhill.identification.second_order import step_response
-from mjhill.reference import rest_state, simulate
+from mjhill.lab.variants import AS_IT_IS, FLAT, LINEAR
+from mjhill.simulate.reference import rest_state, simulate
 
 
 @cache

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from mjhill.comparison.responses import SecondOrder
+from mjhill.analysis.responses import SecondOrder
 from mjhill.experiments.trials.swing import first_swing, second_order_response, swing_measures
 
 

@@ -6,8 +6,8 @@ import pytest
 from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
 
-from mjhill.experiments.bench.rig import muscle_torque
 from mjhill.experiments.paper.tetanus import tetanus
+from mjhill.lab.rig import muscle_torque
 
 
 def contraction(muscle=MUSCLE, **changes):

@@ -7,15 +7,15 @@ from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.dynamometry import (
+from mjhill.experiments.paper.twitch import twitch
+from mjhill.lab.dynamometry import (
     active_torque,
     machine_giving_way,
     runs,
     stiff_machine,
     stimulated,
 )
-from mjhill.experiments.bench.rig import UnmeasuredError, muscle_torque
-from mjhill.experiments.paper.twitch import twitch
+from mjhill.lab.rig import UnmeasuredError, muscle_torque
 
 # --- the dynamometer
 

@@ -16,8 +16,8 @@ from mjhill.comparison.native import (
     native_spec,
     read_spec,
 )
-from mjhill.layout import address, muscle_names, read_muscle
-from mjhill.parameters import Muscle
+from mjhill.engine.layout import address, muscle_names, read_muscle
+from mjhill.muscles.hill import Hill
 
 _PART = 0.5  # control at which the size dependence of MuJoCo's activation is shown
 
@@ -98,7 +98,7 @@ def _units(model: mujoco.MjModel, name: str) -> tuple[str, str]:
 
 
 def _matched(
-    name: str, ours: Muscle, native: NativeMuscle, optimum: float, units: tuple[str, str]
+    name: str, ours: Hill, native: NativeMuscle, optimum: float, units: tuple[str, str]
 ) -> list[Match]:
     force, length = units
     unit, half = native.unit_length, math.sqrt(math.log(2))
@@ -139,9 +139,7 @@ def _matched(
     return [Match(name, *row) for row in rows]
 
 
-def _unmatched(
-    name: str, ours: Muscle, native: NativeMuscle, units: tuple[str, str]
-) -> list[Match]:
+def _unmatched(name: str, ours: Hill, native: NativeMuscle, units: tuple[str, str]) -> list[Match]:
     hill = ours.hill_shape
     rise = native_delay(_PART, rising=True) * native.activation_tau
     no = "not matched: "

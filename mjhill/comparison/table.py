@@ -16,8 +16,8 @@ from mjhill.comparison.cost import StepCost
 from mjhill.comparison.match import Match, matching
 from mjhill.comparison.native import compiled, native_spec, read_spec
 from mjhill.comparison.trials import Pair
-from mjhill.install import installed
-from mjhill.recording import Recording
+from mjhill.engine.install import installed
+from mjhill.simulate.recording import Recording
 
 _HIT_SHARE = 0.15  # of the agonist's maximum
 

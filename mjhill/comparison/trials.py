@@ -12,12 +12,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.comparison import responses
-from mjhill.equilibrium import at_home, equilibrate
-from mjhill.layout import addresses, joint_names, moments, read_muscle
-from mjhill.recording import Recording
-from mjhill.run import record
-from mjhill.signals import Signal, pulse
+from mjhill.analysis import responses
+from mjhill.engine.equilibrium import at_home, equilibrate
+from mjhill.engine.layout import addresses, joint_names, moments, read_muscle
+from mjhill.simulate.recording import Recording
+from mjhill.simulate.run import record
+from mjhill.simulate.signals import Signal, pulse
 
 STEP_TIME = 2.0  # [s]
 PULSES_TIME, PULSE_WIDTH = 1.5, 0.1  # [s]

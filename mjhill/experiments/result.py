@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-from mjhill.recording import Recording
+from mjhill.simulate.recording import Recording
 
 
 def spoken(text: str) -> str:

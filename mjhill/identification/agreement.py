@@ -7,7 +7,7 @@ from math import degrees
 from typing import Any
 
 from mjhill.identification.evidence import Evidence, evidence_on
-from mjhill.parameters import Joint
+from mjhill.joints.joint import Joint
 
 _NEAR = 1.3  # ratio of T1 to T2 below which the two say little singly
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.identification.table import Table
-from mjhill.parameters import Joint
+from mjhill.joints.joint import Joint
 
 _NO_UNIT = ("-", "1", "none")
 _UNITS: Mapping[str, Mapping[str, float]] = {  # quantity: unit to SI, that of SI first

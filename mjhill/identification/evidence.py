@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.identification.ensemble import angles
+from mjhill.analysis.second_order import SecondOrderStep, fit_step, step_response
 from mjhill.identification.free import Free, joint_at
-from mjhill.identification.published import EndAngle, PassiveTorque, end_angles, passive_torques
-from mjhill.identification.second_order import SecondOrderStep, fit_step, step_response
-from mjhill.identification.table2 import Row, rows_of
-from mjhill.parameters import Joint
+from mjhill.joints.joint import Joint
+from mjhill.lab.ensemble import angles
+from mjhill.literature.published import EndAngle, PassiveTorque, end_angles, passive_torques
+from mjhill.literature.table2 import Row, rows_of
 
 MAGNITUDE_SPREAD = 0.01  # of MAG: Table 2 has two digits
 DELAY_SPREAD = 0.03  # of T1 + T2
@@ -35,7 +35,7 @@ class Evidence:
 
     Attributes:
         joint: The joint, of which the free parameters are not looked at.
-        steps: Muscle and row of Table 2, for each run.
+        steps: Hill and row of Table 2, for each run.
         torques: Published passive torques.
         ends: Published ends of the active range of motion.
     """

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.joints import parameter_file, read_joints
-from mjhill.parameters import Joint
+from mjhill.joints.joint import Joint
+from mjhill.joints.reader import parameter_file, read_joints
 
 DEVIATIONS = 2.0  # from the middle of the bounds to either
 _NOT_FITTED = ("gear", "range", "home_angle")  # conventions, of which no data tell

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mjhill.identification.free import Free
 from mjhill.identification.solve import Estimate
-from mjhill.parameters import Joint
+from mjhill.joints.joint import Joint
 
 
 @dataclass(frozen=True)

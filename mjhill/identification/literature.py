@@ -13,8 +13,8 @@ from mjhill.identification.free import free_parameters, joint_at
 from mjhill.identification.identified import Identified
 from mjhill.identification.intervals import intervals
 from mjhill.identification.solve import solve
-from mjhill.joints import read_joints
-from mjhill.parameters import Joint
+from mjhill.joints.joint import Joint
+from mjhill.joints.reader import read_joints
 
 
 def from_literature(

@@ -1,4 +1,4 @@
-"""What can be measured of a joint, by the names that ``data/facts.toml`` uses.
+"""What can be measured of a joint, by the names that ``facts.toml`` uses.
 
 Every measure takes the joint and the muscle concerned, then its own arguments, and returns SI.
 """
@@ -13,7 +13,7 @@ from mjhill.experiments.trials.free_velocity import free_velocity
 from mjhill.experiments.trials.impedance import held_impedance, passive_stiffness, stiffness_slope
 from mjhill.experiments.trials.muscle_twitch import muscle_twitch
 from mjhill.experiments.trials.turn import Turn, turn
-from mjhill.parameters import Joint
+from mjhill.joints.joint import Joint
 
 Measure = Callable[..., float]
 

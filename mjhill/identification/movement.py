@@ -15,8 +15,8 @@ from mjhill.identification.intervals import intervals
 from mjhill.identification.measurement import Measurement
 from mjhill.identification.solve import Solution, solve
 from mjhill.identification.trial import QUANTITIES, Trial, make_trial
-from mjhill.joints import read_joints
-from mjhill.parameters import Joint
+from mjhill.joints.joint import Joint
+from mjhill.joints.reader import read_joints
 
 _FIRST_NOISE = 0.02  # of the spread of what is predicted, until the fit says better
 _ROUNDS = 4

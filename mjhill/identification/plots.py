@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from mjhill.analysis.second_order import step_response
+from mjhill.draw.bellies import MUSCLE_COLOURS
+from mjhill.draw.plot import take_literally
 from mjhill.files import replacing
 from mjhill.identification.evidence import Evidence, evidence_on
 from mjhill.identification.movement import Prediction
-from mjhill.identification.second_order import step_response
-from mjhill.parameters import Joint
-from mjhill.plots import take_literally
-from mjhill.reference import plant_torque
-from mjhill.rendering.bellies import MUSCLE_COLOURS
+from mjhill.joints.joint import Joint
+from mjhill.simulate.reference import plant_torque
 
 _DPI = 110
 

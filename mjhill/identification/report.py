@@ -7,10 +7,10 @@ from math import degrees
 from typing import Any
 
 from mjhill.identification.agreement import published_rows, step_rows
-from mjhill.identification.facts import Fact
 from mjhill.identification.identified import Identified
 from mjhill.identification.movement import Prediction
-from mjhill.parameters import Joint
+from mjhill.joints.joint import Joint
+from mjhill.literature.facts import Fact
 
 
 def estimate_rows(result: Identified) -> list[dict[str, Any]]:
@@ -122,8 +122,9 @@ def _cell(value: Any) -> str:
 _PREFACE = """# Joints beside the literature
 
 Written by `mjhill identify`, which fits the parameters that have bounds in
-`mjhill/data/joints.toml` to Table 2 of Winters & Stark (1987) and to published passive torques and
-ranges of motion (`mjhill/data/table2.csv`, `published.csv`). The bounds are what measurements on
+`mjhill/joints/joints.toml` to Table 2 of Winters & Stark (1987) and to published passive torques
+and ranges of motion (`table2.csv` and `published.csv` in `mjhill/literature`). The bounds are what
+measurements on
 relaxed joints and muscle geometry allow; nothing leaves them. Each fit has a prior, the middle of
 the bounds, so it has one answer and says how much of it came from the data. `mjhill info NAME`
 gives every source.

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.identification.ensemble import angles, driving_torques
 from mjhill.identification.measurement import Measurement
-from mjhill.parameters import Joint
+from mjhill.joints.joint import Joint
+from mjhill.lab.ensemble import angles, driving_torques
 
 QUANTITIES = ("angle", "torque")  # what can be predicted
 _OTHER = {"angle": "torque", "torque": "angle"}

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from mjhill.files import replacing
 from mjhill.identification.identified import Identified
-from mjhill.joints import parameter_file
+from mjhill.joints.reader import parameter_file
 
 _DIGITS = 4  # significant
 

@@ -8,9 +8,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.frequency import SecondOrderFrequency, decibel
+from mjhill.draw.bellies import MUSCLE_COLOURS
 from mjhill.experiments.figures.drawing import every
-from mjhill.rendering.bellies import MUSCLE_COLOURS
+from mjhill.lab.frequency import SecondOrderFrequency, decibel
 
 _Values = NDArray[np.float64]
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjhill.experiments.bench.frequency import decibel
+from mjhill.draw.bellies import MUSCLE_COLOURS
 from mjhill.experiments.figures.drawing import every, shades, tidy
 from mjhill.experiments.result import spoken
-from mjhill.rendering.bellies import MUSCLE_COLOURS
+from mjhill.lab.frequency import decibel
 
 if TYPE_CHECKING:
     from mjhill.experiments.paper.external_sinusoid import ExternalSinusoid

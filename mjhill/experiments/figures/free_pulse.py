@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from mjhill.draw.bellies import MUSCLE_COLOURS
 from mjhill.experiments.trials.pulses import Pulse, ratio_over_time
-from mjhill.rendering.bellies import MUSCLE_COLOURS
 
 
 def draw_pulses(

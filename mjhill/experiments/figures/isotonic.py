@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mjhill.draw.bellies import MUSCLE_COLOURS
 from mjhill.experiments.trials.quick_release import RELEASE
-from mjhill.recording import Recording
-from mjhill.rendering.bellies import MUSCLE_COLOURS
+from mjhill.simulate.recording import Recording
 
 _APART = 0.08  # least distance of two labels, as a share of the axis
 _MARKERS = ("o", "^", "v", "o")

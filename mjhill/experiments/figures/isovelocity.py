@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mjhill.draw.bellies import MUSCLE_COLOURS
 from mjhill.experiments.figures.drawing import tidy
 from mjhill.experiments.paper.isovelocity_claims import Curves
 from mjhill.experiments.trials.torque_velocity import Sweep
-from mjhill.rendering.bellies import MUSCLE_COLOURS
 
 Values = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from mjhill.draw.bellies import MUSCLE_COLOURS
 from mjhill.experiments.figures.drawing import tidy, torque_unit
 from mjhill.experiments.result import spoken
 from mjhill.experiments.trials.stretch import Stretch
-from mjhill.rendering.bellies import MUSCLE_COLOURS
 
 _AFTER = 0.4  # shown of a run after the stretch [s]
 

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mjhill.draw.bellies import MUSCLE_COLOURS
 from mjhill.experiments.figures.drawing import shades, tidy
 from mjhill.experiments.result import spoken
-from mjhill.rendering.bellies import MUSCLE_COLOURS
 
 if TYPE_CHECKING:
     from mjhill.experiments.paper.spring_release import SpringRelease

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from mjhill.equivalent import stretch_at_force, torque_at_velocity
 from mjhill.experiments.figures.drawing import tidy
-from mjhill.parameters import Muscle
+from mjhill.muscles.equivalent import stretch_at_force, torque_at_velocity
+from mjhill.muscles.hill import Hill
 
 # blue, orange, green, purple of Okabe & Ito 2008; dashes where heads hide one another
 _STYLES = (
@@ -20,7 +20,7 @@ _STYLES = (
 )
 
 
-def draw(heads: Mapping[str, Muscle], equivalent: Muscle, figure: Any) -> None:
+def draw(heads: Mapping[str, Hill], equivalent: Hill, figure: Any) -> None:
     """Draw the two panels into a figure."""
     speed_axis, stretch_axis = figure.subplots(1, 2, sharey=True)
     for index, (name, muscle) in enumerate(heads.items()):
@@ -50,7 +50,7 @@ def draw(heads: Mapping[str, Muscle], equivalent: Muscle, figure: Any) -> None:
     figure.legend(loc="outside lower center", ncols=5, frameon=False, **spacing)
 
 
-def _draw(speed_axis: Any, stretch_axis: Any, muscle: Muscle, **style: Any) -> None:
+def _draw(speed_axis: Any, stretch_axis: Any, muscle: Hill, **style: Any) -> None:
     speeds, shares = np.linspace(0, muscle.max_velocity, 200), np.linspace(0, 1, 100)
     torque = torque_at_velocity([muscle], speeds)
     speed_axis.plot(np.degrees(speeds), torque, linewidth=2.2, **style)

@@ -16,17 +16,6 @@ from math import degrees, radians
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-from mjhill.experiments.bench.linear_elements import linear_elements
-from mjhill.experiments.bench.posture import (
-    Unheld,
-    balanced,
-    check_angle,
-    check_ascending,
-    check_between,
-    held_levels,
-    steadiest,
-)
-from mjhill.experiments.bench.rig import as_joint
 from mjhill.experiments.figures.external_impulse import draw
 from mjhill.experiments.result import Claim, Measure, Result
 from mjhill.experiments.trials.hit import (
@@ -42,8 +31,19 @@ from mjhill.experiments.trials.hit import (
 )
 from mjhill.experiments.trials.neural_burst import Burst, hit_with_burst
 from mjhill.experiments.trials.swing import swing_measures
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
+from mjhill.joints.joint import Joint
+from mjhill.lab.linear_elements import linear_elements
+from mjhill.lab.posture import (
+    Unheld,
+    balanced,
+    check_angle,
+    check_ascending,
+    check_between,
+    held_levels,
+    steadiest,
+)
+from mjhill.lab.rig import as_joint
+from mjhill.simulate.recording import Recording
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,13 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.drives import bias_of, frequencies, held_drives, neural_drive
-from mjhill.experiments.bench.frequency import decibel
-from mjhill.experiments.bench.posture import (
+from mjhill.experiments.figures.external_sinusoid import draw
+from mjhill.experiments.result import Claim, Measure, Result
+from mjhill.experiments.trials.sinusoids import Curve, shaken
+from mjhill.joints.joint import Joint
+from mjhill.lab.drives import bias_of, frequencies, held_drives, neural_drive
+from mjhill.lab.frequency import decibel
+from mjhill.lab.posture import (
     Unheld,
     balanced,
     check_angle,
@@ -31,11 +35,7 @@ from mjhill.experiments.bench.posture import (
     static_stiffness,
     steadiest,
 )
-from mjhill.experiments.bench.rig import UnmeasuredError, as_joint, as_muscle, rig
-from mjhill.experiments.figures.external_sinusoid import draw
-from mjhill.experiments.result import Claim, Measure, Result
-from mjhill.experiments.trials.sinusoids import Curve, shaken
-from mjhill.parameters import Joint
+from mjhill.lab.rig import UnmeasuredError, as_joint, as_muscle, rig
 
 _COHERENT = 0.5  # least coherence of a neural response that is looked at
 _APART = 6.0  # between two responses that differ [dB]: one is half of the other

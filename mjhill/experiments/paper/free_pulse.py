@@ -13,17 +13,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mjhill.experiments.bench.rest import resting_angle
-from mjhill.experiments.bench.rig import as_joint, as_muscle, rig, run, still
-from mjhill.experiments.bench.variants import AS_IT_IS, FAST, FLAT, LINEAR, SERIES
 from mjhill.experiments.figures.free_pulse import draw_pulses
 from mjhill.experiments.result import Claim, Measure, Result
 from mjhill.experiments.trials.bursts import clamped
 from mjhill.experiments.trials.pulses import Pulse, doublings, pulses, ratio_at
-from mjhill.parameters import Joint
-from mjhill.readings import isometric_share
-from mjhill.recording import Recording
-from mjhill.signals import pulse
+from mjhill.joints.joint import Joint
+from mjhill.lab.rest import resting_angle
+from mjhill.lab.rig import as_joint, as_muscle, rig, run, still
+from mjhill.lab.variants import AS_IT_IS, FAST, FLAT, LINEAR, SERIES
+from mjhill.muscles.readings import isometric_share
+from mjhill.simulate.recording import Recording
+from mjhill.simulate.signals import pulse
 
 _NEAR = 0.1  # share by which a ratio may miss its number and still count as it
 _HALF = 0.5  # of the isometric torque; below it a torque is low

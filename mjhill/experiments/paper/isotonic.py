@@ -16,15 +16,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.rig import (
-    UnmeasuredError,
-    as_joint,
-    as_muscle,
-    direction,
-    net_torque,
-    rig,
-    strongest_angle,
-)
 from mjhill.experiments.figures.isotonic import draw_releases, draw_torques
 from mjhill.experiments.result import Claim, Measure, Result
 from mjhill.experiments.trials.quick_release import (
@@ -34,8 +25,17 @@ from mjhill.experiments.trials.quick_release import (
     reading,
     released,
 )
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
+from mjhill.joints.joint import Joint
+from mjhill.lab.rig import (
+    UnmeasuredError,
+    as_joint,
+    as_muscle,
+    direction,
+    net_torque,
+    rig,
+    strongest_angle,
+)
+from mjhill.simulate.recording import Recording
 
 _MARGIN = 0.25  # least distance of the reading angle from the ends of the range, in ranges
 _RECOIL = (

@@ -10,14 +10,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjhill.experiments.bench.dynamometry import machine_giving_way, recorded, stiff_machine
-from mjhill.experiments.bench.rig import (
-    Dynamometer,
-    UnmeasuredError,
-    as_joint,
-    as_muscle,
-    rig,
-)
 from mjhill.experiments.figures.isovelocity import draw
 from mjhill.experiments.paper.isovelocity_claims import Curves, claims
 from mjhill.experiments.result import Claim, Measure, Result
@@ -30,8 +22,16 @@ from mjhill.experiments.trials.torque_velocity import (
     own_curve,
     paths,
 )
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
+from mjhill.joints.joint import Joint
+from mjhill.lab.dynamometry import machine_giving_way, recorded, stiff_machine
+from mjhill.lab.rig import (
+    Dynamometer,
+    UnmeasuredError,
+    as_joint,
+    as_muscle,
+    rig,
+)
+from mjhill.simulate.recording import Recording
 
 SHARES = (  # of the contractile element's largest velocity
     *(-0.4, -0.2, -0.1, -0.05, -0.025),

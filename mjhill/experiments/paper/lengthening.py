@@ -9,14 +9,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mjhill.experiments.bench.dynamometry import recorded, stiff_machine
-from mjhill.experiments.bench.rig import as_joint, as_muscle, direction, rig
-from mjhill.experiments.bench.velocity_clamp import check_velocity
 from mjhill.experiments.figures.lengthening import draw
 from mjhill.experiments.result import Claim, Measure, Result
 from mjhill.experiments.trials.stretch import AFTER, Stretch, stretch, stretch_path
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
+from mjhill.joints.joint import Joint
+from mjhill.lab.dynamometry import recorded, stiff_machine
+from mjhill.lab.rig import as_joint, as_muscle, direction, rig
+from mjhill.lab.velocity_clamp import check_velocity
+from mjhill.simulate.recording import Recording
 
 SHARES = (0.02, 0.05, 0.1, 0.2, 0.5)  # of the contractile element's largest velocity
 LEVELS = (0.3, 1.0)

@@ -16,15 +16,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.frequency import decibel, octaves
-from mjhill.experiments.bench.rest import resting_angle
-from mjhill.experiments.bench.rig import Rig, antagonist, as_joint, rig, run, still
 from mjhill.experiments.figures.bode import draw_bode
 from mjhill.experiments.result import Claim, Measure, Result
 from mjhill.experiments.trials.sweep import DECIBELS, DEGREES, Sweep, responses, swept
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
-from mjhill.signals import constant, sinusoid
+from mjhill.joints.joint import Joint
+from mjhill.lab.frequency import decibel, octaves
+from mjhill.lab.rest import resting_angle
+from mjhill.lab.rig import Rig, antagonist, as_joint, rig, run, still
+from mjhill.simulate.recording import Recording
+from mjhill.simulate.signals import constant, sinusoid
 
 _SECOND_ORDER = (2.0, 5.0)  # band of the paper, below which second order will do [Hz]
 _ABOUT = 1.01 * 2 ** (1 / 3)  # the spacing of the frequencies; 5.04 Hz is the one near 5

@@ -21,7 +21,13 @@ from math import degrees, radians
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-from mjhill.experiments.bench.posture import (
+from mjhill.experiments.figures.spring_release import draw
+from mjhill.experiments.result import Claim, Measure, Result
+from mjhill.experiments.trials.hit import strongly_rises
+from mjhill.experiments.trials.spring_trial import Release, release
+from mjhill.experiments.trials.swing import swing_measures
+from mjhill.joints.joint import Joint
+from mjhill.lab.posture import (
     Unheld,
     balanced,
     check_angle,
@@ -30,14 +36,8 @@ from mjhill.experiments.bench.posture import (
     held_levels,
     steadiest,
 )
-from mjhill.experiments.bench.rig import as_joint
-from mjhill.experiments.figures.spring_release import draw
-from mjhill.experiments.result import Claim, Measure, Result
-from mjhill.experiments.trials.hit import strongly_rises
-from mjhill.experiments.trials.spring_trial import Release, release
-from mjhill.experiments.trials.swing import swing_measures
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
+from mjhill.lab.rig import as_joint
+from mjhill.simulate.recording import Recording
 
 _SHARES = (0.5, 1.0, 2.0)  # torque of the springs at 1 rad [largest of the weaker muscle]
 _CLOSE = 0.1  # misfit, as a share of the peak, up to which a fit is a good one

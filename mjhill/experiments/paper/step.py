@@ -15,18 +15,18 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.comparison.responses import settling_time
-from mjhill.experiments.bench.rig import as_joint, rig, run, still
-from mjhill.experiments.bench.variants import AS_IT_IS, FLAT, LINEAR
+from mjhill.analysis.responses import settling_time
+from mjhill.analysis.second_order import step_response
+from mjhill.draw.bellies import MUSCLE_COLOURS
 from mjhill.experiments.result import Claim, Measure, Result, spoken
 from mjhill.experiments.trials.proportion import LONG, proportions, step_responses
 from mjhill.experiments.trials.step_fit import StepFit, fitted_step
 from mjhill.identification.evidence import SHAPE_SPREAD
-from mjhill.identification.second_order import step_response
-from mjhill.identification.table2 import rows_of
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
-from mjhill.rendering.bellies import MUSCLE_COLOURS
+from mjhill.joints.joint import Joint
+from mjhill.lab.rig import as_joint, rig, run, still
+from mjhill.lab.variants import AS_IT_IS, FLAT, LINEAR
+from mjhill.literature.table2 import rows_of
+from mjhill.simulate.recording import Recording
 
 _DELAYS, _SHORTEST = 5.0, 0.8  # a fit's window in mean delays of the slowest step, least [s]
 _MARGIN = 0.9  # of the ratio of inputs; a response above that share is as good as proportional

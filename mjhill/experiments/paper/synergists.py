@@ -1,6 +1,6 @@
 """Several synergists and the one muscle that stands for them (sect. 3.2, Fig. 3).
 
-The anatomy is in ``data/synergists.toml``: so far the three heads of the elbow's extensor.
+The anatomy is in ``literature/synergists.toml``: so far the three heads of the elbow's extensor.
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mjhill
-from mjhill.equivalent import anatomical_muscle, equivalent_muscle, torque_at_velocity
-from mjhill.experiments.bench.rig import Rig, as_joint, rig, run, still
 from mjhill.experiments.figures.synergists import draw
 from mjhill.experiments.result import Claim, Measure, Result
-from mjhill.parameters import Joint, Muscle
-from mjhill.recording import Recording
+from mjhill.joints.joint import Joint
+from mjhill.lab.rig import Rig, as_joint, rig, run, still
+from mjhill.muscles.equivalent import anatomical_muscle, equivalent_muscle, torque_at_velocity
+from mjhill.muscles.hill import Hill
+from mjhill.simulate.recording import Recording
 
-_DATA = Path(mjhill.__file__).parent / "data" / "synergists.toml"
+_DATA = Path(mjhill.__file__).parent / "literature" / "synergists.toml"
 _NEAR = 0.05  # of the largest torque or of a movement: as near as "approximately the same" is
 _DURATION = 0.6  # of a free movement [s]
 
@@ -50,8 +51,8 @@ class Synergists(Result):
     size: ClassVar[tuple[float, float]] = (9.0, 4.4)
     joint: str
     muscle: str
-    heads: Mapping[str, Muscle]
-    equivalent: Muscle
+    heads: Mapping[str, Hill]
+    equivalent: Hill
     together: _Values
     alone: _Values
     time: _Values
@@ -133,7 +134,7 @@ def synergists(
     )  # fmt: skip
 
 
-def _anatomy(joint: Joint) -> tuple[str, dict[str, Muscle]]:
+def _anatomy(joint: Joint) -> tuple[str, dict[str, Hill]]:
     tables = tomllib.loads(_DATA.read_text(encoding="utf-8"))
     if joint.name not in tables:
         raise ValueError(
@@ -148,7 +149,7 @@ def _anatomy(joint: Joint) -> tuple[str, dict[str, Muscle]]:
     }
 
 
-def _with(joint: Joint, muscle: str, others: Mapping[str, Muscle]) -> Joint:
+def _with(joint: Joint, muscle: str, others: Mapping[str, Hill]) -> Joint:
     """A joint in which some muscles stand in place of one."""
     muscles = {name: one for name, one in joint.muscles.items() if name != muscle}
     gears = {name: joint.gears[name] for name in muscles}

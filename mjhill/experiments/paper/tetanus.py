@@ -10,13 +10,13 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.dynamometry import active_torque, stiff_machine, stimulated
-from mjhill.experiments.bench.rig import as_joint, rig
+from mjhill.analysis.second_order import SecondOrderStep, fit_step, step_response
+from mjhill.draw.bellies import MUSCLE_COLOURS
 from mjhill.experiments.figures.drawing import legend_above, tidy
 from mjhill.experiments.result import Claim, Measure, Result, spoken
-from mjhill.identification.second_order import SecondOrderStep, fit_step, step_response
-from mjhill.parameters import Joint
-from mjhill.rendering.bellies import MUSCLE_COLOURS
+from mjhill.joints.joint import Joint
+from mjhill.lab.dynamometry import active_torque, stiff_machine, stimulated
+from mjhill.lab.rig import as_joint, rig
 
 _DURATION = 2.0  # [s]; ten times the slowest rise
 _ANGLES = 15  # at which the largest torque is sought, ends of the range of motion included

@@ -10,15 +10,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.dynamometry import stiff_machine, stimulated
-from mjhill.experiments.bench.rig import as_joint
+from mjhill.draw.bellies import MUSCLE_COLOURS
 from mjhill.experiments.figures.drawing import legend_above, tidy, torque_unit
 from mjhill.experiments.result import Claim, Measure, Result, spoken
 from mjhill.experiments.trials.muscle_twitch import PULSE, TWITCH_TIME, MuscleTwitch, muscle_twitch
-from mjhill.identification.facts import read_entries
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
-from mjhill.rendering.bellies import MUSCLE_COLOURS
+from mjhill.joints.joint import Joint
+from mjhill.lab.dynamometry import stiff_machine, stimulated
+from mjhill.lab.rig import as_joint
+from mjhill.literature.facts import read_entries
+from mjhill.simulate.recording import Recording
 
 _OVER = 0.05  # of its peak: what a twitch that is over has left at most
 _TOLD_APART = 2e-3  # [s]; two samples

@@ -11,8 +11,10 @@ import itertools
 
 import numpy as np
 
-from mjhill.experiments.bench.posture import holding
-from mjhill.experiments.bench.rig import (
+from mjhill.joints.joint import Joint
+from mjhill.lab.ensemble import angles
+from mjhill.lab.posture import holding
+from mjhill.lab.rig import (
     UnmeasuredError,
     antagonist,
     direction,
@@ -20,10 +22,8 @@ from mjhill.experiments.bench.rig import (
     run,
     still,
 )
-from mjhill.identification.ensemble import angles
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
-from mjhill.signals import Signal
+from mjhill.simulate.recording import Recording
+from mjhill.simulate.signals import Signal
 
 _SHARE = 0.6  # of the unclamped travel, where the joint is to stay
 _INSIDE = 0.8  # most of the way from rest to the end of the range of motion

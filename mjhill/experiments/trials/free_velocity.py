@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from mjhill.experiments.bench.rig import UnmeasuredError, direction, rig, run, still
-from mjhill.parameters import Joint
+from mjhill.joints.joint import Joint
+from mjhill.lab.rig import UnmeasuredError, direction, rig, run, still
 
 _TIME = 1.0  # [s]; the slowest joint has crossed its range by then
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from math import degrees, log
 
-from mjhill.experiments.bench.rig import Rig, UnmeasuredError, rig, run, still
 from mjhill.experiments.trials.swing import Swing, first_swing
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
-from mjhill.signals import Signal, pulse
+from mjhill.joints.joint import Joint
+from mjhill.lab.rig import Rig, UnmeasuredError, rig, run, still
+from mjhill.simulate.recording import Recording
+from mjhill.simulate.signals import Signal, pulse
 
 _TRIES, _CLOSE = 8, 0.01  # of the search for an impulse, and how near is near enough
 _GUESS = 0.1  # in which a first guess has the joint at its peak [s]

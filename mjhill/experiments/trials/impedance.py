@@ -9,8 +9,10 @@ from math import radians, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.comparison.responses import SecondOrder, second_order_fit
-from mjhill.experiments.bench.rig import (
+from mjhill.analysis.responses import SecondOrder, second_order_fit
+from mjhill.experiments.trials.swing import second_order_response
+from mjhill.joints.joint import Joint
+from mjhill.lab.rig import (
     Rig,
     UnmeasuredError,
     direction,
@@ -20,11 +22,9 @@ from mjhill.experiments.bench.rig import (
     run,
     still,
 )
-from mjhill.experiments.trials.swing import second_order_response
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
-from mjhill.reference import plant_torque
-from mjhill.signals import pulse
+from mjhill.simulate.recording import Recording
+from mjhill.simulate.reference import plant_torque
+from mjhill.simulate.signals import pulse
 
 _DEFLECTION = radians(1.0)  # what a hit is to move the joint by [rad]
 _CLOSE = 0.05  # of it, near enough

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.comparison.responses import half_life
-from mjhill.experiments.bench.dynamometry import active_torque, stiff_machine, zeroed
-from mjhill.experiments.bench.rig import (
+from mjhill.analysis.responses import half_life
+from mjhill.joints.joint import Joint
+from mjhill.lab.dynamometry import active_torque, stiff_machine, zeroed
+from mjhill.lab.rig import (
     UnmeasuredError,
     direction,
     rig,
@@ -17,9 +18,8 @@ from mjhill.experiments.bench.rig import (
     still,
     strongest_angle,
 )
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
-from mjhill.signals import pulse
+from mjhill.simulate.recording import Recording
+from mjhill.simulate.signals import pulse
 
 PULSE = 2e-3  # [s]; the neural impulse of Winters & Stark 1987, sect. 4.1.1
 TWITCH_TIME = 1.0  # length of a run [s]

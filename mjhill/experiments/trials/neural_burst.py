@@ -9,12 +9,12 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.rig import UnmeasuredError, direction, run, still
 from mjhill.experiments.result import Claim, Measure
 from mjhill.experiments.trials.hit import Hammer
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
-from mjhill.signals import pulse
+from mjhill.joints.joint import Joint
+from mjhill.lab.rig import UnmeasuredError, direction, run, still
+from mjhill.simulate.recording import Recording
+from mjhill.simulate.signals import pulse
 
 _START, _WIDTH = 0.05, 0.04  # after a stretch, as a reflex of medium latency [s]
 _COMPARED = 0.4  # from the hit on, in which input and torque are compared [s]

@@ -7,16 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.rig import direction
-from mjhill.experiments.bench.variants import (
+from mjhill.joints.joint import Joint
+from mjhill.lab.ensemble import angles
+from mjhill.lab.rig import direction
+from mjhill.lab.variants import (
     AS_IT_IS,
     FLAT,
     LINEAR,
     with_flat_torque,
     with_linear_elasticity,
 )
-from mjhill.identification.ensemble import angles
-from mjhill.parameters import Joint
 
 LONG = 10.0  # by when the slowest joint has settled [s]
 

@@ -9,9 +9,12 @@ from math import degrees
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.rest import resting_angle
-from mjhill.experiments.bench.rig import UnmeasuredError, direction
-from mjhill.experiments.bench.variants import (
+from mjhill.experiments.result import Measure
+from mjhill.joints.joint import Joint
+from mjhill.lab.ensemble import angles
+from mjhill.lab.rest import resting_angle
+from mjhill.lab.rig import UnmeasuredError, direction
+from mjhill.lab.variants import (
     AS_IT_IS,
     FAST,
     FLAT,
@@ -22,9 +25,6 @@ from mjhill.experiments.bench.variants import (
     with_linear_elasticity,
     with_linear_series,
 )
-from mjhill.experiments.result import Measure
-from mjhill.identification.ensemble import angles
-from mjhill.parameters import Joint
 
 _VISIBLE = 1e-3  # least travel that a ratio is taken of, as a share of the largest
 

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.rig import Rig, direction, run, still
-from mjhill.parameters import Joint, Muscle
-from mjhill.readings import shortening_velocity, steady_stretch, tension
-from mjhill.recording import Recording
-from mjhill.reference import plant_torque
-from mjhill.signals import Signal
+from mjhill.joints.joint import Joint
+from mjhill.lab.rig import Rig, direction, run, still
+from mjhill.muscles.hill import Hill
+from mjhill.muscles.readings import shortening_velocity, steady_stretch, tension
+from mjhill.simulate.recording import Recording
+from mjhill.simulate.reference import plant_torque
+from mjhill.simulate.signals import Signal
 
 RELEASE = 0.05  # when the load drops [s]
 
@@ -76,7 +77,7 @@ def reading(
     )
 
 
-def own_curve(muscle: Muscle, length: float) -> tuple[_Values, _Values]:
+def own_curve(muscle: Hill, length: float) -> tuple[_Values, _Values]:
     """Velocity [rad/s], ascending, and torque of the shortening element in full activation."""
     isometric = steady_stretch(muscle, 1.0, length)
     stretches = np.linspace(isometric, 0.0, 400).tolist()

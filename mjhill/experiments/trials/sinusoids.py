@@ -11,10 +11,10 @@ import mujoco.batch
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjhill.experiments.bench.drives import Drive
-from mjhill.experiments.bench.frequency import response_at
-from mjhill.experiments.bench.rig import Rig, check_batch, net_torque, still
-from mjhill.install import installed
+from mjhill.engine.install import installed
+from mjhill.lab.drives import Drive
+from mjhill.lab.frequency import response_at
+from mjhill.lab.rig import Rig, check_batch, net_torque, still
 
 _INPUTS = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 _Values = NDArray[np.float64]

@@ -8,11 +8,11 @@ from math import pi, sqrt
 
 import numpy as np
 
-from mjhill.experiments.bench.rig import Spring, net_torque, rig, run, still
 from mjhill.experiments.trials.swing import Swing, first_swing
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
-from mjhill.signals import step
+from mjhill.joints.joint import Joint
+from mjhill.lab.rig import Spring, net_torque, rig, run, still
+from mjhill.simulate.recording import Recording
+from mjhill.simulate.signals import step
 
 _HELD = 0.1  # before the release, in the recording [s]
 

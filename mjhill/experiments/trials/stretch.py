@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.dynamometry import active_torque
-from mjhill.experiments.bench.rig import Dynamometer, rig
-from mjhill.experiments.bench.velocity_clamp import clamped_path, own_torque, ramp_time, travel_time
-from mjhill.parameters import Joint
+from mjhill.joints.joint import Joint
+from mjhill.lab.dynamometry import active_torque
+from mjhill.lab.rig import Dynamometer, rig
+from mjhill.lab.velocity_clamp import clamped_path, own_torque, ramp_time, travel_time
 
 Values = NDArray[np.float64]
 

@@ -9,14 +9,14 @@ from math import ceil, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.frequency import (
+from mjhill.joints.joint import Joint
+from mjhill.lab.ensemble import angles
+from mjhill.lab.frequency import (
     SecondOrderFrequency,
     decibel,
     response_at,
     second_order_band,
 )
-from mjhill.identification.ensemble import angles
-from mjhill.parameters import Joint
 
 DECIBELS, DEGREES = 3.0, 30.0  # how far a second-order fit may be off
 _SETTLE, _CYCLES, _WINDOW = 6.0, 2, 2.0  # transient left out [s]; least cycles and time read [s]

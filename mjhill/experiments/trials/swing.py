@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lsim
 
-from mjhill.comparison.responses import SecondOrder, second_order_fit
+from mjhill.analysis.responses import SecondOrder, second_order_fit
 from mjhill.experiments.result import Measure
 
 _Values = NDArray[np.float64]

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.experiments.bench.dynamometry import active_torque
-from mjhill.experiments.bench.rig import Dynamometer, direction, rig
-from mjhill.experiments.bench.velocity_clamp import (
+from mjhill.joints.joint import Joint
+from mjhill.lab.dynamometry import active_torque
+from mjhill.lab.rig import Dynamometer, direction, rig
+from mjhill.lab.velocity_clamp import (
     RAMP_SHARE,
     check_velocity,
     clamped_path,
@@ -17,7 +18,6 @@ from mjhill.experiments.bench.velocity_clamp import (
     ramp_time,
     travel_time,
 )
-from mjhill.parameters import Joint
 
 _MARGIN = 0.1  # of the range of motion, at either end, where no machine takes a joint
 _ISOMETRIC_TIME = 2.0  # [s]

@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from mjhill.comparison.responses import time_to
-from mjhill.experiments.bench.posture import holding
-from mjhill.experiments.bench.rig import (
+from mjhill.analysis.responses import time_to
+from mjhill.joints.joint import Joint
+from mjhill.lab.posture import holding
+from mjhill.lab.rig import (
     Rig,
     UnmeasuredError,
     angles,
@@ -31,9 +32,8 @@ from mjhill.experiments.bench.rig import (
     run,
     still,
 )
-from mjhill.parameters import Joint
-from mjhill.recording import Recording
-from mjhill.signals import Signal
+from mjhill.simulate.recording import Recording
+from mjhill.simulate.signals import Signal
 
 _FALL_BACK = 0.05  # most that a braked turn may come back after its peak, of the amplitude
 _PULSE_ERROR, _SEARCH_ERROR = 1e-6, 2e-4  # of a pulse's width [s]

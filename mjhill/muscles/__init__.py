@@ -1,0 +1,1 @@
+"""Muscle models: one file each, one line each in the registry."""

@@ -1,0 +1,337 @@
+"""The same equations solved by SciPy's stiff solvers: what the MuJoCo path is measured against.
+
+No MuJoCo in here: only the equations and the parameters.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjhill.elements import (
+    activation_rate,
+    active_length_factor,
+    contractile_velocity,
+    excitation_rate,
+    hypothetical_force,
+    passive_torque,
+    series_force,
+    velocity_scale,
+)
+from mjhill.joints.joint import Joint
+from mjhill.joints.system import Coordinate, Movement, System
+from mjhill.muscles.hill import Hill
+from mjhill.muscles.readings import shortening_velocity, steady_stretch, tension
+from mjhill.simulate.recording import Recording
+from mjhill.simulate.signals import Signal, as_signal, as_signals
+
+Solver = Literal["Radau", "LSODA"]
+
+_Vector = NDArray[np.float64]
+_Rates = Callable[[float, list[float]], list[float]]
+
+
+def simulate(
+    system: Joint | System,
+    excitation: Mapping[str, Signal | float],
+    *,
+    torque: Mapping[str, Signal | float] | Signal | float = 0.0,
+    movement: Mapping[str, Movement] | None = None,
+    duration: float,
+    start: _Vector | None = None,
+    sample: float = 1e-3,
+    rtol: float = 1e-9,
+    atol: float = 1e-11,
+    solver: Solver = "Radau",
+) -> Recording:
+    """Solve the equations of a joint and its two muscles, or of any system.
+
+    Restarted wherever an input jumps.
+
+    Args:
+        system: The joint or system.
+        excitation: Neural input of each muscle, by name; a muscle not named gets 0.
+        torque: External torque [N·m] or force [N] by coordinate; one value serves a joint.
+        movement: Movements of coordinates that are prescribed, by name; the others are free.
+        duration: Length of the run [s].
+        start: State at time 0: position and velocity of each coordinate, then n, a, s of each
+            muscle; by default ``rest_state(system)``.
+        sample: Interval of the recording [s].
+        rtol: Relative tolerance of each step.
+        atol: Absolute tolerance of each step.
+        solver: SciPy's solver: ``"Radau"`` (implicit Runge-Kutta of order 5) or ``"LSODA"``
+            (multistep, several times faster).
+
+    Returns:
+        The recording, with the names that ``mjhill.record`` gives; ``velocity`` of a muscle is
+        the present one.
+
+    Raises:
+        ValueError: A name is unknown, or a number is not positive or not finite.
+        RuntimeError: The solver gave up.
+    """
+    for what, value in (("duration", duration), ("sample", sample)):
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"{what} must be positive, got {value}")
+    whole = System.of(system) if isinstance(system, Joint) else system
+    inputs = as_signals(excitation, whole.muscles, "muscle")
+    inputs = {name: inputs.get(name, as_signal(0.0)) for name in whole.muscles}
+    loads = _loads(whole, torque)
+    movements = _known_movements(whole, movement or {})
+    times: _Vector = np.arange(round(duration / sample) + 1, dtype=np.float64) * sample
+    breaks = [signal.breaks for signal in (*inputs.values(), *loads.values())]
+    breaks += [moved.breaks for moved in movements.values()]
+    knots = _knots(breaks, float(times[-1]))
+    state = rest_state(system) if start is None else np.array(start, dtype=np.float64)
+    states = np.empty((len(times), len(state)))
+    states[0] = state
+    for begin, end in itertools.pairwise(knots):
+        fuzz = 1e-9 * sample
+        inside = (times > begin + fuzz) & (times <= end + fuzz)
+        rates = _rates(whole, inputs, loads, movements, begin, end)
+        solution = _solve(rates, begin, end, state, times[inside], rtol, atol, solver)
+        states[inside] = solution[:, : inside.sum()].T
+        state = solution[:, -1]
+    for index, name in enumerate(whole.coordinates):
+        if name in movements:
+            states[:, 2 * index] = [movements[name].position(time) for time in times]
+            states[:, 2 * index + 1] = [movements[name].velocity(time) for time in times]
+    return _recorded(whole, inputs, loads, times, states, solver)
+
+
+def rest_state(
+    system: Joint | System,
+    angle: float | Mapping[str, float] | None = None,
+    excitation: Mapping[str, float] | None = None,
+) -> _Vector:
+    """State of a joint or system held still, its muscles steady.
+
+    Args:
+        system: The joint, or the system.
+        angle: The position [rad or m], by coordinate or one for all; by default the joint's
+            home angle, or the rest position of each coordinate.
+        excitation: Steady input of each muscle; by default 0.
+
+    Returns:
+        Position and velocity of each coordinate, then n, a, s of each muscle.
+    """
+    if isinstance(system, Joint):
+        angle = system.home_angle if angle is None else angle
+        system = System.of(system)
+    if isinstance(angle, Mapping):
+        positions = dict(angle)
+    else:
+        positions = {
+            name: coordinate.rest if angle is None else float(angle)
+            for name, coordinate in system.coordinates.items()
+        }
+    state: list[float] = []
+    for name in system.coordinates:
+        state += [positions[name], 0.0]
+    for name, muscle in system.muscles.items():
+        u = (excitation or {}).get(name, 0.0)
+        length = system.length(name, positions)
+        state += [u, u, length - steady_stretch(muscle, u, length)]
+    return np.array(state)
+
+
+def plant_torque(joint: Joint, angle: float) -> float:
+    """Torque of a joint's passive elasticity at an angle [N·m]."""
+    return _passive(System.of(joint).coordinates[joint.name], angle)
+
+
+def _passive(coordinate: Coordinate, position: float) -> float:
+    passive, deviation = coordinate.passive, position - coordinate.rest
+    if passive is None:
+        return -coordinate.stiffness * deviation
+    return passive_torque(
+        deviation,
+        coordinate.stiffness,
+        passive.k1_pos,
+        passive.k2_pos,
+        passive.k1_neg,
+        passive.k2_neg,
+        passive.exponent_limit,
+    )
+
+
+def _loads(
+    system: System, torque: Mapping[str, Signal | float] | Signal | float
+) -> dict[str, Signal]:
+    """The external torque of every coordinate."""
+    if not isinstance(torque, Mapping):
+        if len(system.coordinates) > 1 and torque != 0.0:
+            known = ", ".join(system.coordinates)
+            raise ValueError(f"torque must be given by coordinate; there are: {known}")
+        torque = dict.fromkeys(system.coordinates, torque)
+    given = as_signals(torque, system.coordinates, "coordinate")
+    return {name: given.get(name, as_signal(0.0)) for name in system.coordinates}
+
+
+def _known_movements(system: System, movement: Mapping[str, Movement]) -> dict[str, Movement]:
+    for name in movement:
+        if name not in system.coordinates:
+            known = ", ".join(system.coordinates)
+            raise ValueError(f"unknown coordinate {name!r}; there are: {known}")
+    return dict(movement)
+
+
+def _rates(
+    system: System,
+    inputs: Mapping[str, Signal],
+    loads: Mapping[str, Signal],
+    movements: Mapping[str, Movement],
+    begin: float,
+    end: float,
+) -> _Rates:
+    """The right-hand side between two jumps of the inputs."""
+    order = {name: index for index, name in enumerate(system.coordinates)}
+    muscles = [
+        (inputs[name], muscle, [(order[joint], arm) for joint, arm in system.arms[name].items()])
+        for name, muscle in system.muscles.items()
+    ]
+    coordinates = [
+        (coordinate, loads[name], movements.get(name))
+        for name, coordinate in system.coordinates.items()
+    ]
+    last = end - 1e-9 * (end - begin)
+
+    def rates(time: float, state: list[float]) -> list[float]:
+        # an input that jumps at the end of the interval keeps its value from inside
+        now = min(max(time, begin), last)
+        result, forces, positions = [], [], []
+        for index, (coordinate, load, movement) in enumerate(coordinates):
+            position, velocity = state[2 * index], state[2 * index + 1]
+            if movement is not None:
+                position, velocity = movement.position(time), movement.velocity(time)
+            positions.append(position)
+            forces.append(
+                load(now) - coordinate.damping * velocity + _passive(coordinate, position)
+            )
+            result += [velocity, 0.0]
+        first = 2 * len(coordinates)
+        for index, (signal, muscle, arms) in enumerate(muscles):
+            n, a, s = state[first + 3 * index : first + 3 * index + 3]
+            length = sum([arm * positions[joint] for joint, arm in arms])
+            rows, force = _muscle_rates(muscle, signal(now), n, a, s, length)
+            result += rows
+            for joint, arm in arms:
+                forces[joint] -= arm * force
+        for index, (coordinate, _, movement) in enumerate(coordinates):
+            if movement is None:
+                result[2 * index + 1] = forces[index] / coordinate.inertia
+        return result
+
+    return rates
+
+
+def _muscle_rates(
+    muscle: Hill, u: float, n: float, a: float, s: float, length: float
+) -> tuple[list[float], float]:
+    """Rates of n, a and s, and the muscle's tension."""
+    force, _ = series_force(
+        length - s, muscle.series_stretch, muscle.series_shape, muscle.series_limit
+    )
+    factor = active_length_factor(
+        length, muscle.optimal_length, muscle.width_short, muscle.width_long
+    )
+    hypothetical = hypothetical_force(a, factor, muscle.activation_floor)
+    velocity, _, _, _ = contractile_velocity(
+        force,
+        hypothetical,
+        muscle.hill_shape,
+        muscle.eccentric_plateau,
+        muscle.eccentric_slope_ratio,
+        muscle.viscosity,
+    )
+    velocity *= muscle.max_velocity * velocity_scale(hypothetical, muscle.velocity_activation)
+    source = u if muscle.electrical_stimulation else n
+    rates = [
+        excitation_rate(u, n, muscle.excitation_tau),
+        activation_rate(source, a, muscle.activation_tau, muscle.deactivation_tau),
+        -velocity,
+    ]
+    return rates, muscle.max_isometric_force * force
+
+
+def _knots(breaks: Iterable[tuple[float, ...]], end: float) -> list[float]:
+    """Times of restart: 0, every jump inside the run, its end; sums of inputs may repeat one."""
+    knots = [0.0]
+    for time in sorted(itertools.chain.from_iterable(breaks)):
+        if knots[-1] + 1e-9 < time < end - 1e-9:
+            knots.append(time)
+    return [*knots, end]
+
+
+def _solve(
+    rates: _Rates,
+    begin: float,
+    end: float,
+    state: _Vector,
+    times: _Vector,
+    rtol: float,
+    atol: float,
+    solver: Solver,
+) -> Any:
+    from scipy.integrate import solve_ivp
+
+    result = solve_ivp(
+        lambda time, values: rates(time, values.tolist()),
+        (begin, end),
+        state,
+        method=solver,
+        t_eval=np.unique(np.append(np.minimum(times, end), end)),
+        rtol=rtol,
+        atol=atol,
+        max_step=0.02,  # no short pulse of a smooth input is stepped over
+    )
+    if not result.success:
+        raise RuntimeError(f"the reference solver stopped at {result.t[-1]:g} s: {result.message}")
+    return result.y
+
+
+def _recorded(
+    system: System,
+    inputs: Mapping[str, Signal],
+    loads: Mapping[str, Signal],
+    times: _Vector,
+    states: _Vector,
+    solver: Solver,
+) -> Recording:
+    series: dict[str, _Vector] = {}
+    units: dict[str, str] = {}
+    for index, (name, coordinate) in enumerate(system.coordinates.items()):
+        position, unit = ("position", "m") if coordinate.slide else ("angle", "rad")
+        series[f"{name}.{position}"], units[f"{name}.{position}"] = states[:, 2 * index], unit
+        series[f"{name}.velocity"] = states[:, 2 * index + 1]
+        units[f"{name}.velocity"] = f"{unit}/s"
+    for name, load in loads.items():
+        series[f"{name}.applied"] = np.array([load(time) for time in times])
+        units[f"{name}.applied"] = "N" if system.coordinates[name].slide else "N·m"
+    order = {name: 2 * index for index, name in enumerate(system.coordinates)}
+    first = 2 * len(system.coordinates)
+    for index, (name, muscle) in enumerate(system.muscles.items()):
+        n, a, s = states[:, first + 3 * index : first + 3 * index + 3].T
+        arms = system.arms[name].items()
+        length = np.sum([arm * states[:, order[joint]] for joint, arm in arms], axis=0)
+        rows = list(zip(a.tolist(), length.tolist(), (length - s).tolist(), strict=True))
+        unit, effort = ("m", "N") if system.slides(name) else ("rad", "N·m")
+        columns = {
+            "u": ("-", np.array([inputs[name](time) for time in times])),
+            "n": ("-", n),
+            "a": ("-", a),
+            "velocity": (
+                f"{unit}/s",
+                np.array([shortening_velocity(muscle, *row) for row in rows]),
+            ),
+            "stretch": (unit, length - s),
+            "force": (effort, np.array([tension(muscle, stretch) for _, _, stretch in rows])),
+        }
+        for quantity, (kind, values) in columns.items():
+            series[f"{name}.{quantity}"], units[f"{name}.{quantity}"] = values, kind
+    about: dict[str, str | float] = {"joint": system.name, "solver": f"SciPy {solver}"}
+    return Recording(times, {k: np.ascontiguousarray(v) for k, v in series.items()}, units, about)
