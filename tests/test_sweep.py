@@ -93,3 +93,13 @@ def test_the_command_replays_a_case_and_refuses_what_it_does_not_know():
     assert f"unknown kind of system 'elastic'; there are: {', '.join(KINDS)}" in run.output
     run = CliRunner().invoke(main, ["bench", "accuracy", "--count", "3"])
     assert run.exit_code == 2
+
+
+@pytest.mark.parametrize(("case", "timestep"), [("wide:79", 2e-3), ("slide:24", 1e-3)])
+def test_a_swing_that_the_discrete_integrator_gets_wrong_has_a_finding(case, timestep):
+    [outcome] = sweep.replay(case, ("discrete",), (timestep,))
+    assert outcome.error > 5
+    assert "it swings with little damping" in outcome.finding
+    [outcome] = sweep.replay(case, ("implicitfast",), (timestep,))
+    assert outcome.error < 5
+    assert not outcome.finding

@@ -32,7 +32,9 @@ from mjhill.quantity import quantities
 # stiffness, in units of what a timestep can hold: from where forces ring, and from where 5 % may
 # be lost; docs/numerics.md says how they were chosen
 RINGING, COARSE = 0.7, 0.3
-STEPS = 12  # timesteps a period below which a movement with little damping may be off by 5 %
+# timesteps a period below which a movement with little damping may be off by 5 %; under
+# "discrete" it is off two to three times as much as under others
+STEPS, STEPS_DISCRETE = 12, 30
 # custom numeric with the options that a model is made for: gravity, timestep, integrator
 MADE_FOR = "mjhill_made_for"
 
@@ -195,13 +197,15 @@ def _check_elasticities(model: mujoco.MjModel) -> None:
 def _fast_joints(model: mujoco.MjModel, names: list[str]) -> Iterator[Finding]:
     """Findings on joints that muscles make too stiff for the timestep, one for each joint."""
     timestep = float(model.opt.timestep)
+    discrete = model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE
+    steps = STEPS_DISCRETE if discrete else STEPS
     parts = Plant.parts(model)
     overloads = [mode for part in parts for mode in part.overloads(timestep, COARSE)]
-    swings = [swing for part in parts for swing in part.swings(2 * math.pi / (STEPS * timestep))]
+    swings = [swing for part in parts for swing in part.swings(2 * math.pi / (steps * timestep))]
     if not overloads and not swings:
         return
     enough = min(part.longest(timestep, COARSE) for part in parts)
-    enough = min([enough, *(0.999 * swing.period / STEPS for swing in swings)])
+    enough = min([enough, *(0.999 * swing.period / steps for swing in swings)])
     remedy = f"set model.opt.timestep to {_rounded_down(enough):g} s or less"
     joints, found = joint_names(model), dict[int, Finding]()
     for mode in sorted(overloads, key=lambda mode: -mode.load):
@@ -221,7 +225,7 @@ def _fast_joints(model: mujoco.MjModel, names: list[str]) -> Iterator[Finding]:
     for swing in swings:
         problem = (
             f"with its muscles at full force it swings with little damping and a period of "
-            f"{swing.period:.2g} s, {swing.period / timestep:.2g} timesteps; below {STEPS} results "
+            f"{swing.period:.2g} s, {swing.period / timestep:.2g} timesteps; below {steps} results "
             "may be off by 5 %"
         )
         subject = f"joint {joints[swing.joint]!r}"
