@@ -16,11 +16,10 @@ from mjhill.identification.free import Free, joint_at
 from mjhill.joints.joint import Joint
 from mjhill.lab.ensemble import angles
 from mjhill.literature.published import EndAngle, PassiveTorque, end_angles, passive_torques
-from mjhill.literature.table2 import Row, rows_of
+from mjhill.literature.table2 import SHAPE_SPREAD, Row, rows_of
 
 MAGNITUDE_SPREAD = 0.01  # of MAG: Table 2 has two digits
 DELAY_SPREAD = 0.03  # of T1 + T2
-SHAPE_SPREAD = 0.05  # of MAG, between a response and a second-order one
 _SHAPE_SAMPLES = 60
 _SETTLED = 5.0  # duration of a run, in units of the largest T1 + T2 ...
 _SHORTEST = 0.8  # ... and at least this [s]

@@ -14,6 +14,7 @@ from pathlib import Path
 from mjhill.joints.joint import Joint
 
 _DATA = Path(__file__).parent / "table2.csv"
+SHAPE_SPREAD = 0.05  # of MAG, between a response and a second-order one
 
 
 @dataclass(frozen=True)

@@ -21,11 +21,10 @@ from mjhill.draw.bellies import MUSCLE_COLOURS
 from mjhill.experiments.result import Claim, Measure, Result, spoken
 from mjhill.experiments.trials.proportion import LONG, proportions, step_responses
 from mjhill.experiments.trials.step_fit import StepFit, fitted_step
-from mjhill.identification.evidence import SHAPE_SPREAD
 from mjhill.joints.joint import Joint
 from mjhill.lab.rig import as_joint, rig, run, still
 from mjhill.lab.variants import AS_IT_IS, FLAT, LINEAR
-from mjhill.literature.table2 import rows_of
+from mjhill.literature.table2 import SHAPE_SPREAD, rows_of
 from mjhill.simulate.recording import Recording
 
 _DELAYS, _SHORTEST = 5.0, 0.8  # a fit's window in mean delays of the slowest step, least [s]
