@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from mjhill.analysis.second_order import SecondOrderStep, fit_step
 from mjhill.experiments.result import Measure
-from mjhill.identification.evidence import SHAPE_SPREAD
 from mjhill.joints.joint import Joint
-from mjhill.literature.table2 import Row
+from mjhill.literature.table2 import SHAPE_SPREAD, Row
 
 _RESOLVED = 0.01  # least T2, as a share of T1; K and B divide by it
 
