@@ -21,9 +21,13 @@ from mjhill.joints.joint import Joint as Joint
 from mjhill.joints.joint import Passive as Passive
 from mjhill.joints.reader import JOINTS as JOINTS
 from mjhill.joints.reader import read_joints as read_joints
+from mjhill.muscles import MODELS as MODELS
+from mjhill.muscles import Muscle as Muscle
+from mjhill.muscles import readings as readings
 from mjhill.muscles.equivalent import anatomical_muscle as anatomical_muscle
 from mjhill.muscles.equivalent import equivalent_muscle as equivalent_muscle
 from mjhill.muscles.hill import Hill as Hill
+from mjhill.muscles.hill_rigid import HillRigid as HillRigid
 from mjhill.simulate import reference as reference
 from mjhill.simulate.energy import Energy as Energy
 from mjhill.simulate.energy import energy as energy

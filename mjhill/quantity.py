@@ -58,11 +58,27 @@ def quantity(
     *,
     default: Any = MISSING,
     low_allowed: bool = False,
+    array: str = "",
 ) -> Any:
-    """A field of a parameter class that is a ``Quantity``."""
+    """A field of a parameter class that is a ``Quantity``.
+
+    Args:
+        symbol: Its symbol in the equations.
+        unit: Its unit, or that on a hinge and that on a slide or tendon.
+        meaning: One phrase.
+        bounds: Lower and upper bound.
+        default: Its default; without one it must be given.
+        low_allowed: Whether the lower bound is itself allowed.
+        array: The array of an actuator that holds it, such as ``gainprm``; for muscles.
+    """
     units = (unit, unit) if isinstance(unit, str) else unit
-    quantity = Quantity(symbol, units, meaning, *bounds, low_allowed)
-    return field(default=default, metadata={"quantity": quantity})
+    described = Quantity(symbol, units, meaning, *bounds, low_allowed)
+    return field(default=default, metadata={"quantity": described, "array": array})
+
+
+def flag(*, default: bool, array: str = "") -> Any:
+    """A field of a parameter class that is True or False; ``array`` as for ``quantity``."""
+    return field(default=default, metadata={"flag": True, "array": array})
 
 
 def quantities(cls: type) -> Iterator[tuple[str, Quantity]]:
@@ -72,15 +88,25 @@ def quantities(cls: type) -> Iterator[tuple[str, Quantity]]:
             yield item.name, item.metadata["quantity"]
 
 
+def flags(cls: type) -> Iterator[str]:
+    """Name of each field of a parameter class that is True or False."""
+    return (item.name for item in fields(cls) if "flag" in item.metadata)
+
+
 def check_quantities(parameters: Any) -> None:
-    """Check every ``Quantity`` of an object and keep it as a float.
+    """Check every ``Quantity`` and flag of an object, and keep them as floats and bools.
 
     Raises:
-        ValueError: One is not a finite number inside its bounds.
+        ValueError: One is not a finite number inside its bounds, or not True or False.
     """
-    for name, quantity in quantities(type(parameters)):
-        quantity.check(name, getattr(parameters, name))
+    for name, described in quantities(type(parameters)):
+        described.check(name, getattr(parameters, name))
         object.__setattr__(parameters, name, float(getattr(parameters, name)))
+    for name in flags(type(parameters)):
+        value = getattr(parameters, name)
+        if value not in (False, True):
+            raise ValueError(f"{name} must be False or True, got {value!r}")
+        object.__setattr__(parameters, name, bool(value))
 
 
 def sources() -> Any:

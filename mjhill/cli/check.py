@@ -62,8 +62,7 @@ def _looked_at(model: mujoco.MjModel) -> dict[str, str | int]:
     """What was checked, in words for people."""
     import mujoco
 
-    from mjhill.cli.describe import elastic_joints
-    from mjhill.engine.layout import muscle_ids, muscle_names
+    from mjhill.engine.layout import elastic_joints, muscle_ids, muscle_names
 
     muscles = muscle_ids(model)
     on_tendons = int((model.actuator_trntype[muscles] == int(mujoco.mjtTrn.mjTRN_TENDON)).sum())

@@ -106,9 +106,10 @@ def info(model: str, mjcf: bool, as_json: bool) -> None:
     """Show the parameters of MODEL, a joint's name or a path, with units and sources."""
     from mjhill.cli.describe import gravity, rows
     from mjhill.engine.mjcf import snippet
+    from mjhill.simulate.load import load
 
     if mjcf:
-        click.echo(snippet(model))
+        click.echo(snippet(load(model)))
         return
     print_table(rows(model), as_json, title=model)
     if not as_json:

@@ -10,8 +10,7 @@ import mujoco
 
 from mjhill.engine.layout import (
     addresses,
-    has_passive,
-    joint_names,
+    elastic_joints,
     read_muscle,
     read_passive,
     turns,
@@ -81,13 +80,6 @@ def _angle_rows(joint: Joint) -> Iterator[dict[str, Any]]:
             "meaning": meaning,
             "source": joint.sources.get(name, ""),
         }
-
-
-def elastic_joints(model: mujoco.MjModel) -> Iterator[tuple[str, bool]]:
-    """Joints with passive elasticity, and whether each is a hinge."""
-    for joint, name in enumerate(joint_names(model)):
-        if has_passive(model, joint):
-            yield name, bool(model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE)
 
 
 def _part_rows(name: str, part: Any, hinge: bool) -> Iterator[dict[str, Any]]:

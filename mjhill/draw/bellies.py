@@ -94,8 +94,10 @@ def drawn_muscles(model: mujoco.MjModel, recording: Recording | None) -> tuple[D
         if force is None or not recorded:
             continue
         colour = MUSCLE_COLOURS[len(found) % len(MUSCLE_COLOURS)]
-        # ours have n, a, s; the native muscle has a
-        activation = int(model.actuator_actadr[i]) + layout.is_muscle(model, i)
+        kind = layout.muscle_model(model, i)
+        activation = int(model.actuator_actadr[i])  # of the native muscle's only state
+        if kind is not None:
+            activation += kind.state_names.index(kind.activation)
         out = int(model.actuator_outadr[i])
         tendon = _tendon(model, i, name)
         found.append(DrawnMuscle(name, activation, out, force, tendon, colour))
@@ -191,8 +193,9 @@ def hide_tendons(model: mujoco.MjModel, muscles: Iterable[DrawnMuscle]) -> None:
 
 
 def _max_force(model: mujoco.MjModel, actuator: int) -> float | None:
-    if layout.is_muscle(model, actuator):
-        array, slot = layout.SLOTS["max_isometric_force"]
+    kind = layout.muscle_model(model, actuator)
+    if kind is not None:
+        array, slot = kind.slots["max_isometric_force"]
         return float(getattr(model, f"actuator_{array}")[actuator, slot])
     if model.actuator_gaintype[actuator] != mujoco.mjtGain.mjGAIN_MUSCLE:
         return None

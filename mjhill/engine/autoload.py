@@ -97,10 +97,10 @@ def _act_bias(m: int, d: int, actuator: int) -> float:
 
 
 def _actuator(name: str, m: int, d: int, actuator: int) -> float:
-    from mjhill.engine.layout import MUSCLE_TAG
+    from mjhill.muscles import BY_TAG
 
     offsets, passed_on = _offsets(), PROCESS.served[name].pointer
-    if offsets and _tag(m + offsets[1], actuator) == MUSCLE_TAG:
+    if offsets and _tag(m + offsets[1], actuator) in BY_TAG:
         functions = _functions()
         # what cannot be computed must not look like a relaxed muscle
         return float(functions[name](m, d, actuator)) if functions else math.nan

@@ -12,22 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.engine.layout import (
-    MUSCLE_TAG,
     NUSER_JNT,
     PASSIVE_TAG,
     SCALAR_JOINTS,
-    STATES,
+    Group,
     actuator_names,
+    has_tag,
+    in_order,
     joint_names,
     moments,
+    muscle_groups,
     muscle_ids,
-    parameter_columns,
     read_muscles,
     read_passive,
+    state_count,
 )
 from mjhill.engine.stability import Plant
-from mjhill.muscles.hill import Hill
-from mjhill.quantity import quantities
+from mjhill.muscles import BY_TAG
+from mjhill.quantity import flags, quantities
 
 # stiffness, in units of what a timestep can hold: from where forces ring, and from where 5 % may
 # be lost; docs/numerics.md says how they were chosen
@@ -81,11 +83,13 @@ def check_model(model: mujoco.MjModel) -> tuple[Finding, ...]:
         RuntimeWarning: A finding is severe.
     """
     names = actuator_names(model)
-    half = (model.actuator_dynprm[:, 0] == MUSCLE_TAG) & ~_whole(model)
+    muscles, groups = muscle_ids(model), muscle_groups(model)
+    half = has_tag(model)
+    half[muscles] = ~_whole(model)[muscles]
     for actuator in np.flatnonzero(half).tolist():
         _check_marks(model, actuator, names[actuator])
-    muscles = muscle_ids(model)
-    _check_bounds(model, muscles)
+    if not all(map(_in_bounds, groups)):
+        read_muscles(model)  # says which
     _check_gears(model, muscles, names)
     _check_elasticities(model)
     timestep = float(model.opt.timestep)
@@ -93,11 +97,11 @@ def check_model(model: mujoco.MjModel) -> tuple[Finding, ...]:
         raise ValueError(f"timestep must be positive, got {timestep} s; set model.opt.timestep")
     findings = (
         *_fast_joints(model, names),
-        *_fast_activation(model, muscles, names),
+        *_fast_activation(model, groups, names),
         *_pushing(model, muscles, names),
-        *_clipped(model, muscles, names),
+        *_clipped(model, groups, muscles, names),
         *_powerless(model, muscles, names),
-        *_cut_off(model, muscles),
+        *_cut_off(model, groups, muscles),
         *_made_otherwise(model),
     )
     for finding in findings:
@@ -113,7 +117,6 @@ def _whole(model: mujoco.MjModel) -> NDArray[np.bool_]:
         (model.actuator_dyntype == int(mujoco.mjtDyn.mjDYN_USER))
         & (model.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED))
         & (model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_USER))
-        & (model.actuator_actnum == STATES)
         & (model.actuator_gainprm[:, 0] == 0)
         & (model.actuator_actlimited == 0)
         & (model.actuator_outnum == 1)
@@ -121,7 +124,15 @@ def _whole(model: mujoco.MjModel) -> NDArray[np.bool_]:
 
 
 def _check_marks(model: mujoco.MjModel, actuator: int, name: str) -> None:
-    """Say what of ``_whole`` a tagged actuator lacks."""
+    """Say what a tagged actuator lacks of a muscle."""
+    tag = float(model.actuator_dynprm[actuator, 0])
+    if tag not in BY_TAG:
+        known = ", ".join(f"{known:.0f} ({kind.name})" for known, kind in BY_TAG.items())
+        raise ValueError(
+            f"actuator {name!r} has the tag dynprm[0] = {tag:.0f}, of a muscle model that this "
+            f"mjhill does not know; there are: {known}; a newer mjhill may know it"
+        )
+    kind, states = BY_TAG[tag], int(state_count(model, BY_TAG[tag], actuator))
     wanted = [
         ("dyntype", mujoco.mjtDyn(int(model.actuator_dyntype[actuator])), mujoco.mjtDyn.mjDYN_USER),
         (
@@ -134,7 +145,7 @@ def _check_marks(model: mujoco.MjModel, actuator: int, name: str) -> None:
             mujoco.mjtBias(int(model.actuator_biastype[actuator])),
             mujoco.mjtBias.mjBIAS_USER,
         ),
-        ("actdim", int(model.actuator_actnum[actuator]), STATES),
+        ("actdim", int(model.actuator_actnum[actuator]), states),
         ("gainprm[0]", float(model.actuator_gainprm[actuator, 0]), 0.0),
         ("actlimited", bool(model.actuator_actlimited[actuator]), False),
         ("number of outputs", int(model.actuator_outnum[actuator]), 1),
@@ -143,8 +154,8 @@ def _check_marks(model: mujoco.MjModel, actuator: int, name: str) -> None:
         if found != needed:
             raise ValueError(
                 f"actuator {name!r} is half a mjhill muscle: it has the tag "
-                f"dynprm[0] = {MUSCLE_TAG:.0f} but {what} is {_word(found)}, not "
-                f"{_word(needed)}; set it, or add the muscle with mjhill.add_muscle"
+                f"dynprm[0] = {tag:.0f} of the model {kind.name!r} but {what} is {_word(found)}, "
+                f"not {_word(needed)}; set it, or add the muscle with mjhill.add_muscle"
             )
 
 
@@ -152,16 +163,16 @@ def _word(value: object) -> str:
     return str(getattr(value, "name", value)).rpartition("_")[2].lower()
 
 
-def _check_bounds(model: mujoco.MjModel, muscles: list[int]) -> None:
-    columns = parameter_columns(model, muscles)
-    stimulated = columns["electrical_stimulation"]
-    good = (stimulated == 0) | (stimulated == 1)
-    for name, quantity in quantities(Hill):
-        values = columns[name]
+def _in_bounds(group: Group) -> bool:
+    """Whether the parameters of all muscles of a model are inside their bounds."""
+    kind, good = group.model.parameters, np.ones(len(group.actuators), bool)
+    for name in flags(kind):
+        good &= (group.columns[name] == 0) | (group.columns[name] == 1)
+    for name, quantity in quantities(kind):
+        values = group.columns[name]
         above = values >= quantity.low if quantity.low_allowed else values > quantity.low
         good &= above & (values <= quantity.high)  # not so for NaN
-    if not good.all():
-        read_muscles(model)  # says which
+    return bool(good.all())
 
 
 def _check_gears(model: mujoco.MjModel, muscles: list[int], names: list[str]) -> None:
@@ -240,26 +251,24 @@ def _rounded_down(timestep: float) -> float:
 
 
 def _fast_activation(
-    model: mujoco.MjModel, muscles: list[int], names: list[str]
+    model: mujoco.MjModel, groups: list[Group], names: list[str]
 ) -> Iterator[Finding]:
     """Findings on time constants that RK4 cannot follow; other integrators are exact there."""
     if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:
         return
     timestep = float(model.opt.timestep)
-    columns = parameter_columns(model, muscles)
-    for what in ("excitation_tau", "activation_tau", "deactivation_tau"):
-        for row in np.flatnonzero(timestep > columns[what]).tolist():
-            if what == "excitation_tau" and columns["electrical_stimulation"][row]:
-                continue
-            tau = float(columns[what][row])
-            yield Finding(
-                f"muscle {names[muscles[row]]!r}",
-                f"timestep over {what} is {timestep / tau:.3g}, past 1, so RK4 slows it down and "
-                "the result may be off by 5 %",
-                f"set model.opt.timestep to {tau:.2g} s or less, or another integrator",
-                False,
-                tau,
-            )
+    for group in groups:
+        for what, taus in group.ask(group.model.time_constants).items():
+            for row in np.flatnonzero(timestep > taus).tolist():
+                tau = float(taus[row])
+                yield Finding(
+                    f"muscle {names[int(group.actuators[row])]!r}",
+                    f"timestep over {what} is {timestep / tau:.3g}, past 1, so RK4 slows it down "
+                    "and the result may be off by 5 %",
+                    f"set model.opt.timestep to {tau:.2g} s or less, or another integrator",
+                    False,
+                    tau,
+                )
 
 
 def _pushing(model: mujoco.MjModel, muscles: list[int], names: list[str]) -> Iterator[Finding]:
@@ -279,12 +288,15 @@ def _pushing(model: mujoco.MjModel, muscles: list[int], names: list[str]) -> Ite
             )
 
 
-def _clipped(model: mujoco.MjModel, muscles: list[int], names: list[str]) -> Iterator[Finding]:
+def _clipped(
+    model: mujoco.MjModel, groups: list[Group], muscles: list[int], names: list[str]
+) -> Iterator[Finding]:
     """Findings on forces that MuJoCo cuts off, of which the muscle's states know nothing."""
     outs = model.actuator_outadr[muscles]
     limited = model.actuator_forcelimited[outs].astype(bool)
-    forces = parameter_columns(model, muscles)
-    largest = forces["max_isometric_force"] * forces["eccentric_plateau"]
+    if not limited.any():
+        return
+    largest, _ = in_order(groups, "lengthening")
     low, high = model.actuator_forcerange[outs].T
     for row in np.flatnonzero(limited & ((low > -largest) | (high < 0))).tolist():
         yield Finding(
@@ -319,11 +331,11 @@ def _powerless(model: mujoco.MjModel, muscles: list[int], names: list[str]) -> I
             )
 
 
-def _cut_off(model: mujoco.MjModel, muscles: list[int]) -> Iterator[Finding]:
+def _cut_off(model: mujoco.MjModel, groups: list[Group], muscles: list[int]) -> Iterator[Finding]:
     """Findings on joints and tendons that limit the force of all their actuators together."""
-    if not (model.jnt_actfrclimited.any() or model.tendon_actfrclimited.any()):
+    if not groups or not (model.jnt_actfrclimited.any() or model.tendon_actfrclimited.any()):
         return
-    forces = parameter_columns(model, muscles)["max_isometric_force"]
+    (forces,) = in_order(groups, "max_isometric_force")
     outs, ids = model.actuator_outadr[muscles], model.actuator_trnid[muscles, 0]
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)

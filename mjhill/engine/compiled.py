@@ -6,17 +6,19 @@ Each call is a pure function of model and data, so they serve any number of thre
 
 from __future__ import annotations
 
-import inspect
-import math
-from collections.abc import Callable
-from types import FunctionType, ModuleType
+from collections.abc import Iterable
+from functools import partial
+from types import FunctionType
 from typing import Any
 
 import mujoco
 import numba
 
-from mjhill import elements
+from mjhill.elements import passive_torque
+from mjhill.engine.equations import compiled_functions, globals_of, with_callees
 from mjhill.engine.intrinsics import (
+    argument_row,
+    as_array,
     chained_act_bias,
     chained_act_dyn,
     chained_passive,
@@ -26,10 +28,12 @@ from mjhill.engine.intrinsics import (
     load_pointer,
     read_delayed_control,
     store_double,
+    store_tuple,
 )
-from mjhill.engine.layout import MUSCLE_TAG, NUSER_JNT, PASSIVE_TAG, SLOTS, STATES
+from mjhill.engine.layout import NUSER_JNT, PASSIVE_TAG
 from mjhill.engine.structs import offset
-from mjhill.muscles import scheme
+from mjhill.muscles import MODELS, MuscleModel
+from mjhill.muscles.model import ARRAYS, Equation, arguments
 
 _ROW = 8 * 10  # bytes of one actuator's dynprm, gainprm or biasprm
 _JIT: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True}
@@ -41,35 +45,25 @@ _CLAMP_DISABLED = int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
 _MAXVAL = float(mujoco.mjMAXVAL)
 
 
-def _compile_equations(*modules: ModuleType) -> dict[str, Callable[..., Any]]:
-    """Every function of ``modules``, jitted, each calling the jitted others."""
-    namespace: dict[str, Any] = {"exp": math.exp, "log": math.log, "sqrt": math.sqrt}
-    for module in modules:
-        namespace.update((k, v) for k, v in vars(module).items() if isinstance(v, (int, float)))
-        for name, function in inspect.getmembers(module, inspect.isfunction):
-            if function.__module__ == module.__name__:
-                bound = FunctionType(function.__code__, namespace, name)
-                namespace[name] = numba.njit(**_JIT)(bound)
-    return namespace
+Jitted = dict[Any, Any]  # by equation
 
 
-_equations = _compile_equations(elements, scheme)
-muscle_rates = _equations["muscle_rates"]
-series_force = _equations["series_force"]
-present_stretch = _equations["present_stretch"]
-passive_torque = _equations["passive_torque"]
-
-
-def _slot(name: str) -> int:
-    return 8 * SLOTS[name][1]
+def _jit_equations(models: Iterable[MuscleModel]) -> Jitted:
+    """Every equation of the models and what it calls, jitted, each calling the jitted others."""
+    jitted: Jitted = {}
+    for function in with_callees(compiled_functions(models)):
+        namespace = {name: jitted.get(value, value) for name, value in globals_of(function).items()}
+        bound = FunctionType(function.__code__, namespace, function.__name__)
+        jitted[function] = numba.njit(**_JIT)(bound)
+    return jitted
 
 
 _ACTUATOR = numba.float64(numba.int64, numba.int64, numba.int32)
 _GENERIC = numba.void(numba.int64, numba.int64)
 
 
-def _make_control() -> Any:
-    """The input the engine would use, see ``python.control``."""
+def _make_excitation() -> Any:
+    """The control that the engine would use, see ``python.excitation``."""
     m_ctrladr = offset("mjModel.actuator_ctrladr")
     m_delay = offset("mjModel.actuator_delay")
     m_history = offset("mjModel.actuator_history")
@@ -80,7 +74,7 @@ def _make_control() -> Any:
     d_ctrl = offset("mjData.ctrl")
 
     @numba.njit(**_JIT)
-    def control(m: int, d: int, i: int) -> float:
+    def excitation(m: int, d: int, i: int) -> float:
         ctrl = numba.int64(load_int(load_pointer(m + m_ctrladr) + 4 * i))
         u = load_double(load_pointer(d + d_ctrl) + 8 * ctrl)
         if load_double(load_pointer(m + m_delay) + 8 * i) != 0.0:
@@ -94,144 +88,156 @@ def _make_control() -> Any:
             return 0.0
         return min(max(u, 0.0), 1.0)
 
-    return control
+    return excitation
 
 
-_control = _make_control()
+_excitation = _make_excitation()
 
 
-def _make_act_dyn() -> Any:
+def _called(model: MuscleModel, equation: Equation, jitted: Jitted) -> Any:
+    """A jitted equation, called with what it asks for from where that is in memory."""
+    function, names = jitted[equation], arguments(equation)
+    row = argument_row(names, model)
+    wants_states, wants_rates = (name in names for name in ARRAYS)
+
+    if wants_states and wants_rates:
+
+        @numba.njit(**_JIT)
+        def call(act: int, act_dot: int, count: int, *given: Any) -> Any:
+            states, rates = as_array(act, count), as_array(act_dot, count)
+            return function(states, rates, *row(act, act_dot, *given))
+
+    elif wants_states:
+
+        @numba.njit(**_JIT)
+        def call(act: int, act_dot: int, count: int, *given: Any) -> Any:
+            return function(as_array(act, count), *row(act, act_dot, *given))
+
+    else:
+
+        @numba.njit(**_JIT)
+        def call(act: int, act_dot: int, count: int, *given: Any) -> Any:
+            return function(*row(act, act_dot, *given))
+
+    return call
+
+
+def _make_count(model: MuscleModel) -> Any:
+    """The number of states that a muscle's parameters ask for."""
+    named = len(model.states)
+    if not model.bins:
+
+        @numba.njit(**_JIT)
+        def count(dyn: int, gain: int, bias: int) -> int:
+            return named
+
+        return count
+    row = argument_row((model.bins,), model)
+
+    @numba.njit(**_JIT)
+    def count_bins(dyn: int, gain: int, bias: int) -> int:
+        (bins,) = row(0, 0, False, 0.0, 0.0, 0.0, 0.0, dyn, gain, bias)
+        return named + numba.int64(bins)
+
+    return count_bins
+
+
+def _make_actuator(
+    models: Iterable[MuscleModel], jitted: Jitted, field: str, finish: Any, chained: Any
+) -> Any:
+    """A callback of actuators: an equation of the model whose muscle the actuator is.
+
+    Args:
+        models: The models to serve.
+        jitted: Their equations.
+        field: The field of ``MuscleModel`` that is the equation.
+        finish: Makes, for a model, the function from the equation's result to the callback's.
+        chained: What serves other actuators.
+    """
+    serves = chained
+    for model in reversed(list(models)):
+        equation = _called(model, getattr(model, field), jitted)
+        serves = _make_link(model, equation, finish(model), serves)
+    first = serves
+
+    @numba.cfunc(_ACTUATOR, **_JIT)
+    def callback(m: int, d: int, actuator: int) -> float:
+        return first(m, d, actuator)
+
+    return callback
+
+
+def _make_link(model: MuscleModel, equation: Any, finish: Any, rest: Any) -> Any:
+    """Serves the muscles of one model, and leaves other actuators to the rest."""
+    m_dyntype, m_actnum = offset("mjModel.actuator_dyntype"), offset("mjModel.actuator_actnum")
     m_dynprm, m_gainprm = offset("mjModel.actuator_dynprm"), offset("mjModel.actuator_gainprm")
-    m_biasprm, m_actnum = offset("mjModel.actuator_biasprm"), offset("mjModel.actuator_actnum")
-    m_actadr, m_outadr = offset("mjModel.actuator_actadr"), offset("mjModel.actuator_outadr")
-    m_length0 = offset("mjModel.actuator_length0")
+    m_biasprm, m_actadr = offset("mjModel.actuator_biasprm"), offset("mjModel.actuator_actadr")
+    m_outadr, m_length0 = offset("mjModel.actuator_outadr"), offset("mjModel.actuator_length0")
     m_timestep, m_integrator = offset("mjModel.opt.timestep"), offset("mjModel.opt.integrator")
     d_act, d_act_dot = offset("mjData.act"), offset("mjData.act_dot")
     d_length, d_velocity = offset("mjData.actuator_length"), offset("mjData.actuator_velocity")
-    tau_nex, tau_act = _slot("excitation_tau"), _slot("activation_tau")
-    tau_deact, floor = _slot("deactivation_tau"), _slot("activation_floor")
-    stimulated = _slot("electrical_stimulation")
-    optimal, width_short, width_long = map(_slot, ("optimal_length", "width_short", "width_long"))
-    stretch_max, shape, limit = map(_slot, ("series_stretch", "series_shape", "series_limit"))
-    max_velocity, hill = _slot("max_velocity"), _slot("hill_shape")
-    plateau, slope_ratio = _slot("eccentric_plateau"), _slot("eccentric_slope_ratio")
-    viscosity, share = _slot("viscosity"), _slot("velocity_activation")
+    tag, wanted = model.tag, _make_count(model)
 
-    @numba.cfunc(_ACTUATOR, **_JIT)
-    def act_dyn(m: int, d: int, actuator: int) -> float:
+    @numba.njit(**_JIT)
+    def serve(m: int, d: int, actuator: int) -> float:
         i = numba.int64(actuator)
         dyn = load_pointer(m + m_dynprm) + _ROW * i
-        actnum = load_int(load_pointer(m + m_actnum) + 4 * i)
-        if load_double(dyn) != MUSCLE_TAG or actnum != STATES:
-            return chained_act_dyn(m, d, actuator)
         gain = load_pointer(m + m_gainprm) + _ROW * i
         bias = load_pointer(m + m_biasprm) + _ROW * i
-        out = 8 * numba.int64(load_int(load_pointer(m + m_outadr) + 4 * i))
-        first = 8 * numba.int64(load_int(load_pointer(m + m_actadr) + 4 * i))
-        act = load_pointer(d + d_act) + first
-        n_rate, a_rate, s_rate = muscle_rates(
-            load_int(m + m_integrator) == _RK4,
-            _control(m, d, i),
-            load_double(act),
-            load_double(act + 8),
-            load_double(act + 16),
-            load_double(load_pointer(d + d_length) + out)
-            - load_double(load_pointer(m + m_length0) + out),
-            load_double(load_pointer(d + d_velocity) + out),
-            load_double(m + m_timestep),
-            load_double(dyn + tau_nex),
-            load_double(dyn + tau_act),
-            load_double(dyn + tau_deact),
-            load_double(dyn + stimulated),
-            load_double(dyn + floor),
-            load_double(gain + optimal),
-            load_double(gain + width_short),
-            load_double(gain + width_long),
-            load_double(gain + stretch_max),
-            load_double(gain + shape),
-            load_double(gain + limit),
-            load_double(bias + max_velocity),
-            load_double(bias + hill),
-            load_double(bias + plateau),
-            load_double(bias + slope_ratio),
-            load_double(bias + viscosity),
-            load_double(bias + share),
-        )
-        act_dot = load_pointer(d + d_act_dot) + first
-        store_double(act_dot, n_rate)
-        store_double(act_dot + 8, a_rate)
-        store_double(act_dot + 16, s_rate)
-        return s_rate
-
-    return act_dyn
-
-
-def _make_act_bias() -> Any:
-    m_dyntype, m_dynprm = offset("mjModel.actuator_dyntype"), offset("mjModel.actuator_dynprm")
-    m_gainprm, m_actnum = offset("mjModel.actuator_gainprm"), offset("mjModel.actuator_actnum")
-    m_actadr, m_outadr = offset("mjModel.actuator_actadr"), offset("mjModel.actuator_outadr")
-    m_length0 = offset("mjModel.actuator_length0")
-    m_timestep, m_integrator = offset("mjModel.opt.timestep"), offset("mjModel.opt.integrator")
-    d_act, d_act_dot = offset("mjData.act"), offset("mjData.act_dot")
-    d_length = offset("mjData.actuator_length")
-    d_velocity, m_biasprm = offset("mjData.actuator_velocity"), offset("mjModel.actuator_biasprm")
-    floor = _slot("activation_floor")
-    optimal, width_short, width_long = map(_slot, ("optimal_length", "width_short", "width_long"))
-    stretch_max, shape, limit = map(_slot, ("series_stretch", "series_shape", "series_limit"))
-    max_velocity, hill = _slot("max_velocity"), _slot("hill_shape")
-    plateau, slope_ratio = _slot("eccentric_plateau"), _slot("eccentric_slope_ratio")
-    viscosity, share = _slot("viscosity"), _slot("velocity_activation")
-    max_force = _slot("max_isometric_force")
-
-    @numba.cfunc(_ACTUATOR, **_JIT)
-    def act_bias(m: int, d: int, actuator: int) -> float:
-        i = numba.int64(actuator)
-        dyn = load_pointer(m + m_dynprm) + _ROW * i
-        actnum = load_int(load_pointer(m + m_actnum) + 4 * i)
+        count = numba.int64(load_int(load_pointer(m + m_actnum) + 4 * i))
         dyntype = load_int(load_pointer(m + m_dyntype) + 4 * i)
-        if load_double(dyn) != MUSCLE_TAG or actnum != STATES or dyntype != _USER:
-            return chained_act_bias(m, d, actuator)
-        gain = load_pointer(m + m_gainprm) + _ROW * i
-        bias = load_pointer(m + m_biasprm) + _ROW * i
-        out = 8 * numba.int64(load_int(load_pointer(m + m_outadr) + 4 * i))
+        if load_double(dyn) != tag or count != wanted(dyn, gain, bias) or dyntype != _USER:
+            return rest(m, d, actuator)
         first = 8 * numba.int64(load_int(load_pointer(m + m_actadr) + 4 * i))
-        act = load_pointer(d + d_act) + first
-        stretch = present_stretch(
+        out = 8 * numba.int64(load_int(load_pointer(m + m_outadr) + 4 * i))
+        act, act_dot = load_pointer(d + d_act) + first, load_pointer(d + d_act_dot) + first
+        result = equation(
+            act,
+            act_dot,
+            count,
             load_int(m + m_integrator) == _RK4,
-            load_double(act + 8),
-            load_double(act + 16),
-            load_double(load_pointer(d + d_act_dot) + first + 16),
+            _excitation(m, d, i),
             load_double(load_pointer(d + d_length) + out)
             - load_double(load_pointer(m + m_length0) + out),
             load_double(load_pointer(d + d_velocity) + out),
             load_double(m + m_timestep),
-            load_double(dyn + floor),
-            load_double(gain + optimal),
-            load_double(gain + width_short),
-            load_double(gain + width_long),
-            load_double(gain + stretch_max),
-            load_double(gain + shape),
-            load_double(gain + limit),
-            load_double(bias + max_velocity),
-            load_double(bias + hill),
-            load_double(bias + plateau),
-            load_double(bias + slope_ratio),
-            load_double(bias + viscosity),
-            load_double(bias + share),
+            dyn,
+            gain,
+            bias,
         )
-        force, _ = series_force(
-            stretch,
-            load_double(gain + stretch_max),
-            load_double(gain + shape),
-            load_double(gain + limit),
-        )
-        # tension is positive in elements; MuJoCo's force is positive when it lengthens
-        return -force * load_double(gain + max_force)
+        return finish(result, act_dot, count)
 
-    return act_bias
+    return serve
 
 
-def _make_passive() -> Any:
+def _write_rates(model: MuscleModel) -> Any:
+    """Writes the rates of a model's states, if its equation has not, and returns the last."""
+    if "state_rates" in arguments(model.rates):
+
+        @numba.njit(**_JIT)
+        def last(result: Any, act_dot: int, count: int) -> float:
+            return load_double(act_dot + 8 * (count - 1))
+
+        return last
+
+    @numba.njit(**_JIT)
+    def write(result: Any, act_dot: int, count: int) -> float:
+        store_tuple(act_dot, result)
+        return result[-1]
+
+    return write
+
+
+def _pull(_model: MuscleModel) -> Any:
+    @numba.njit(**_JIT)
+    def pull(tension: float, act_dot: int, count: int) -> float:
+        # tension is positive in equations; MuJoCo's force is positive when it lengthens
+        return -tension
+
+    return pull
+
+
+def _make_passive(passive_torque: Any) -> Any:
     m_njnt, m_nuser, m_user = map(offset, ("mjModel.njnt", "mjModel.nuser_jnt", "mjModel.jnt_user"))
     m_type, m_qposadr = offset("mjModel.jnt_type"), offset("mjModel.jnt_qposadr")
     m_dofadr, m_treeid = offset("mjModel.jnt_dofadr"), offset("mjModel.dof_treeid")
@@ -273,10 +279,12 @@ def _make_passive() -> Any:
 
 def compile_callbacks() -> dict[str, tuple[str, bytes]]:
     """Symbol and object code of each callback, by its name in MuJoCo less ``mjcb_``."""
+    jitted = _jit_equations(MODELS)
+    make = partial(_make_actuator, MODELS, jitted)
     functions = {
-        "act_dyn": _make_act_dyn(),
-        "act_bias": _make_act_bias(),
-        "passive": _make_passive(),
+        "act_dyn": make("rates", _write_rates, chained_act_dyn),
+        "act_bias": make("force", _pull, chained_act_bias),
+        "passive": _make_passive(jitted[passive_torque]),
     }
     code = {}
     for name, function in functions.items():

@@ -7,32 +7,24 @@ import math
 import mujoco
 import numpy as np
 
-from mjhill.elements import (
-    active_length_factor,
-    hypothetical_force,
-    passive_torque,
-    series_force,
-    series_stretch_at,
-)
+from mjhill.elements import passive_torque
 from mjhill.engine.layout import (
     NUSER_JNT,
-    STATES,
     actuator_names,
+    addresses,
     has_passive,
+    in_order,
     joint_names,
-    muscle_ids,
-    parameter_columns,
+    muscle_groups,
+    read_muscles,
     read_passive,
 )
-from mjhill.engine.python import control
+from mjhill.engine.python import excitation, excitations
+from mjhill.muscles.model import STRONGEST, arguments
 
-STRONGEST = 3.0  # tension that no muscle has [F_max]
 ROUNDING = 1e-6  # by which n and a may be outside [0, 1]
 
 _HOME = "home"
-# the parameters on which the steady state depends, in the order in which it is computed
-_FACTOR = ("optimal_length", "width_short", "width_long")
-_SERIES = ("series_stretch", "series_shape", "series_limit")
 
 
 def at_home(model: mujoco.MjModel) -> mujoco.MjData:
@@ -58,44 +50,36 @@ def at_home(model: mujoco.MjModel) -> mujoco.MjData:
 def equilibrate(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Set every muscle's states to their steady values for the present pose and controls.
 
-    n and a become the control; s becomes the contractile length at which contractile and series
-    element carry the same force at rest. The pose stays: the joint need not be in balance.
+    For ``mjhill.Hill``, n and a become the excitation; s becomes the contractile length at which
+    contractile and series element carry the same force at rest. The pose stays: the joint need
+    not be in balance.
 
     Raises:
         ValueError: A control or a position is not finite.
     """
     check_finite(data)
     mujoco.mj_fwdPosition(model, data)
-    muscles = muscle_ids(model)
-    if not muscles:
-        return
-    outs = model.actuator_outadr[muscles]
-    lengths = (data.actuator_length[outs] - model.actuator_length0[outs]).tolist()
-    columns = parameter_columns(model, muscles)
-    factors = zip(*(columns[name].tolist() for name in _FACTOR), strict=True)
-    floors = columns["activation_floor"].tolist()
-    series = zip(*(columns[name].tolist() for name in _SERIES), strict=True)
-    states = np.empty((len(muscles), STATES))
-    inputs = _controls(model, data, muscles)
-    for row, (u, length, factor, floor, element) in enumerate(
-        zip(inputs, lengths, factors, floors, series, strict=True)
-    ):
-        force = hypothetical_force(u, active_length_factor(length, *factor), floor)
-        states[row] = u, u, length - series_stretch_at(force, *element)
-    data.act[model.actuator_actadr[muscles][:, None] + np.arange(STATES)] = states
+    for group in muscle_groups(model):
+        outs = model.actuator_outadr[group.actuators]
+        given = {
+            "u": _excitations(model, data, group.actuators.tolist()),
+            "length": (data.actuator_length[outs] - model.actuator_length0[outs]).tolist(),
+        }
+        steady = group.model.steady
+        wanted = [
+            given[name] if name in given else group.columns[name].tolist()
+            for name in arguments(steady)
+        ]
+        states = np.array([steady(*row) for row in zip(*wanted, strict=True)])
+        first = model.actuator_actadr[group.actuators]
+        data.act[first[:, None] + np.arange(states.shape[1])] = states
 
 
-def _controls(model: mujoco.MjModel, data: mujoco.MjData, muscles: list[int]) -> list[float]:
-    """``control`` of each muscle, all at once where none has a delay."""
-    if model.actuator_delay[muscles].any():
-        return [control(model, data, actuator) for actuator in muscles]
-    addresses = model.actuator_ctrladr[muscles]
-    u = data.ctrl[addresses]
-    if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL:
-        low, high = model.actuator_ctrlrange[addresses].T
-        u = np.where(model.actuator_ctrllimited[addresses], np.clip(u, low, high), u)
-    u[np.abs(u) > mujoco.mjMAXVAL] = 0.0
-    return [float(value) for value in np.clip(u, 0.0, 1.0)]
+def _excitations(model: mujoco.MjModel, data: mujoco.MjData, actuators: list[int]) -> list[float]:
+    """``excitation`` of each muscle, all at once where none has a delay."""
+    if model.actuator_delay[actuators].any():
+        return [excitation(model, data, actuator) for actuator in actuators]
+    return [float(u) for u in excitations(model, data.ctrl, actuators)]
 
 
 def check_finite(data: mujoco.MjData) -> None:
@@ -114,57 +98,58 @@ def check_states(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Refuse data that no muscle and no elasticity could be in, or that no step could leave well.
 
     Raises:
-        ValueError: n or a is outside [0, 1]; s is not a number, or would stretch or slacken the
-            series element beyond what it can be; a muscle is torn apart so fast that it would
-            carry more than ``STRONGEST``; or a joint is so deep in its passive elasticity that
-            the timestep cannot follow. The message names the muscle or joint.
+        ValueError: A state is outside its bounds, as n and a outside [0, 1]; a state is not a
+            number, or one that its muscle model calls impossible, such as an s that would stretch
+            or slacken the series element beyond what it can be; a muscle is torn apart so fast
+            that it would carry more than ``STRONGEST``; or a joint is so deep in its passive
+            elasticity that the timestep cannot follow. The message names the muscle or joint.
     """
     mujoco.mj_fwdPosition(model, data)
-    muscles = muscle_ids(model)
-    if muscles:
-        _check_muscles(model, data, muscles)
+    if muscle_groups(model):
+        mujoco.mj_fwdVelocity(model, data)
+        _check_torn(model, data)
+        _check_muscles(model, data)
     elastic = [joint for joint in range(model.njnt) if has_passive(model, joint)]
     if elastic:
         _check_elasticities(model, data, elastic)
 
 
-def _check_muscles(model: mujoco.MjModel, data: mujoco.MjData, muscles: list[int]) -> None:
-    mujoco.mj_fwdVelocity(model, data)
-    outs, first = model.actuator_outadr[muscles], model.actuator_actadr[muscles]
-    states = data.act[first[:, None] + np.arange(STATES)]
-    columns = parameter_columns(model, muscles)
-    stretch = data.actuator_length[outs] - model.actuator_length0[outs] - states[:, 2]
-    slackest = 10 * (columns["series_stretch"] + columns["width_short"] + columns["width_long"])
-    # tension in fast lengthening [F_max], see contractile_velocity
-    slowest = columns["max_velocity"] * (1 - columns["velocity_activation"])
+def _check_muscles(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    remedy = "call mjhill.equilibrate(model, data)"
+    muscles = read_muscles(model)
+    for name, at in addresses(model):
+        kind = at.model
+        values = data.act[at.act : at.act + model.actuator_actnum[at.actuator]].tolist()
+        states = dict(zip(kind.state_names, values, strict=False))
+        for state in kind.states:
+            value = states[state.name]
+            if state.share and not -ROUNDING <= value <= 1 + ROUNDING:
+                raise ValueError(
+                    f"muscle {name!r}: its state {state.name} must be in [0, 1], got {value:g}; "
+                    f"{remedy}"
+                )
+        length = float(data.actuator_length[at.out] - model.actuator_length0[at.out])
+        wrong = kind.fault(muscles[name], states, length)
+        bad = [k for k, value in enumerate(values) if not math.isfinite(value)]
+        if wrong is None and bad:
+            wrong = f"its state number {bad[0]} must be finite, got {values[bad[0]]}"
+        if wrong is not None:
+            raise ValueError(f"muscle {name!r}: {wrong}; {remedy}")
+
+
+def _check_torn(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Refuse muscles that are lengthened so fast that they would tear."""
+    groups = muscle_groups(model)
+    ids = sorted(actuator for group in groups for actuator in group.actuators.tolist())
+    held, more = in_order(groups, "lengthening")
+    (force,) = in_order(groups, "max_isometric_force")
+    rate = data.actuator_velocity[model.actuator_outadr[ids]]
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        torn = columns["eccentric_plateau"] + columns["viscosity"] * (
-            np.maximum(data.actuator_velocity[outs], 0.0) / slowest
-        )
-    inside = ((states[:, :2] >= -ROUNDING) & (states[:, :2] <= 1 + ROUNDING)).all(axis=1)
-    good = inside & (stretch >= -slackest) & (torn <= STRONGEST)
-    elements = zip(*(columns[name].tolist() for name in _SERIES), strict=True)
-    tensions = [
-        series_force(x, *element)[0] for x, element in zip(stretch.tolist(), elements, strict=True)
-    ]
-    for row in np.flatnonzero(~(good & (np.array(tensions) <= STRONGEST))).tolist():
-        subject = f"muscle {actuator_names(model)[muscles[row]]!r}"
-        n, a, s = states[row].tolist()
-        remedy = "call mjhill.equilibrate(model, data)"
-        if not inside[row]:
-            what, value = ("n", n) if not -ROUNDING <= n <= 1 + ROUNDING else ("a", a)
-            raise ValueError(
-                f"{subject}: its state {what} must be in [0, 1], got {value:g}; {remedy}"
-            )
-        if torn[row] > STRONGEST:
-            raise ValueError(
-                f"{subject}: it is lengthened at {data.actuator_velocity[outs[row]]:.3g} per "
-                f"second and would carry {torn[row]:.3g} F_max, above {STRONGEST:g}; start slower"
-            )
+        torn = (held + more * np.maximum(rate, 0.0)) / force
+    for row in np.flatnonzero(~(torn <= STRONGEST)).tolist():
         raise ValueError(
-            f"{subject}: its contractile length s = {s:g} would stretch the series element by "
-            f"{stretch[row]:g}, to {tensions[row]:.3g} F_max; allowed are {STRONGEST:g} F_max at "
-            f"most, and a stretch of {-slackest[row]:.3g} at least; {remedy}"
+            f"muscle {actuator_names(model)[ids[row]]!r}: it is lengthened at {rate[row]:.3g} per "
+            f"second and would carry {torn[row]:.3g} F_max, above {STRONGEST:g}; start slower"
         )
 
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import numba
 from llvmlite import ir
 from numba import extending, types
 from numba.core import cgutils
 
 from mjhill.engine.machine_code import CHAIN_SYMBOL, READ_CONTROL
+from mjhill.muscles import MuscleModel
+from mjhill.muscles.model import ARRAYS, CONTEXT, FIRST_SLOT
 
 intrinsic: Any = extending.intrinsic  # its wrappers are called without the typing context
 
@@ -42,6 +45,74 @@ def store_double(typingctx: Any, address: Any, value: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(types.int64, types.float64), codegen
+
+
+@intrinsic
+def store_tuple(typingctx: Any, address: Any, values: Any) -> Any:
+    """Write the doubles of a tuple from an address on."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        for k in range(len(values)):
+            at = builder.add(args[0], _I64(8 * k))
+            value = builder.extract_value(args[1], k)
+            builder.store(value, builder.inttoptr(at, _F64.as_pointer()))
+        return context.get_dummy_value()
+
+    return types.void(types.int64, values), codegen
+
+
+@intrinsic
+def _as_pointer(typingctx: Any, address: Any) -> Any:
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.inttoptr(args[0], _F64.as_pointer())
+
+    return types.CPointer(types.float64)(types.int64), codegen
+
+
+@numba.njit(forceinline=True)
+def as_array(address: int, count: int) -> Any:
+    """Doubles from an address on as an array, shape (count,)."""
+    return numba.carray(_as_pointer(address), (count,))  # type: ignore[attr-defined]
+
+
+def argument_row(names: tuple[str, ...], model: MuscleModel) -> Any:
+    """A function that collects what an equation asks for by name, arrays left out, as a tuple.
+
+    Its arguments are the addresses of the states and of their rates, the context of
+    ``CONTEXT``, and the addresses of ``dynprm``, ``gainprm`` and ``biasprm``.
+    """
+    wanted = [name for name in names if name not in ARRAYS]
+    given = ("act", "act_dot", *CONTEXT, *FIRST_SLOT)
+    kinds = [types.boolean if name == "staged" else types.float64 for name in wanted]
+    taken = [types.int64, types.int64, types.boolean, *[types.float64] * 4, *[types.int64] * 3]
+    result = types.Tuple(kinds)
+
+    @intrinsic
+    def row(
+        typingctx: Any, act: Any, act_dot: Any, staged: Any, u: Any, length: Any, length_rate: Any,
+        timestep: Any, dynprm: Any, gainprm: Any, biasprm: Any,
+    ) -> Any:  # fmt: skip
+        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            have = dict(zip(given, args, strict=True))
+
+            def load(start: str, index: int) -> Any:
+                at = builder.add(have[start], _I64(8 * index))
+                return builder.load(builder.inttoptr(at, _F64.as_pointer()))
+
+            def value(name: str) -> Any:
+                if name in CONTEXT:
+                    return have[name]
+                if name in model.slots:
+                    return load(*model.slots[name])
+                if name in model.state_names:
+                    return load("act", model.state_names.index(name))
+                return load("act_dot", model.state_names.index(name.removesuffix("_rate")))
+
+            return context.make_tuple(builder, signature.return_type, [value(n) for n in wanted])
+
+        return result(*taken), codegen
+
+    return row
 
 
 def _chained(builder: Any, index: int) -> Any:

@@ -1,74 +1,32 @@
-"""Where a muscle lives in MuJoCo: parameter slots, states, addresses. The one slot table.
+"""Where a muscle lives in MuJoCo: states, parameter slots, addresses.
 
-A muscle is ``<general dyntype="user" gaintype="fixed" biastype="user" actdim="3">``. Its states
-are ``act = [n, a, s]``; its parameters fill ``actuator_dynprm`` (excitation and activation),
-``actuator_gainprm`` (length) and ``actuator_biasprm`` (velocity). The exponential passive
-elasticity of a joint is in ``jnt_user``.
+A muscle is ``<general dyntype="user" gaintype="fixed" biastype="user">``. ``actuator_dynprm[0]``
+is the tag of its model, which says how many states it has and in which slots of ``dynprm``,
+``gainprm`` and ``biasprm`` its parameters are. The exponential passive elasticity of a joint is
+in ``jnt_user``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from mjhill.joints.joint import Passive
-from mjhill.muscles.hill import Hill
+from mjhill.muscles import BY_TAG, MODELS, TAGS, Muscle, MuscleModel, model_of
 
-MUSCLE_TAG = 198701.0  # dynprm[0] of a muscle with three states, slots as below
 PASSIVE_TAG = 198702.0  # jnt_user[0] of a joint with exponential passive elasticity
-STATES = 3  # n, a, s
 # joints with one coordinate, which can have passive elasticity
 SCALAR_JOINTS = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
-
-# parameter -> array and index; gainprm[0] is the gain of the fixed gain type and must be 0
-SLOTS: dict[str, tuple[str, int]] = {
-    "excitation_tau": ("dynprm", 1),
-    "activation_tau": ("dynprm", 2),
-    "deactivation_tau": ("dynprm", 3),
-    "electrical_stimulation": ("dynprm", 4),
-    "activation_floor": ("dynprm", 5),
-    "max_isometric_force": ("gainprm", 1),
-    "optimal_length": ("gainprm", 2),
-    "width_short": ("gainprm", 3),
-    "width_long": ("gainprm", 4),
-    "series_stretch": ("gainprm", 5),
-    "series_shape": ("gainprm", 6),
-    "series_limit": ("gainprm", 7),
-    "max_velocity": ("biasprm", 0),
-    "hill_shape": ("biasprm", 1),
-    "eccentric_plateau": ("biasprm", 2),
-    "eccentric_slope_ratio": ("biasprm", 3),
-    "viscosity": ("biasprm", 4),
-    "velocity_activation": ("biasprm", 5),
-}
 PASSIVE_SLOTS = ("k1_pos", "k2_pos", "k1_neg", "k2_neg", "exponent_limit")  # jnt_user[1:6]
 NUSER_JNT = 1 + len(PASSIVE_SLOTS)
+ARRAYS = ("dynprm", "gainprm", "biasprm")
 
-# the parameters of ``scheme.muscle_rates``, in its order
-RATE_PARAMETERS = (
-    "excitation_tau",
-    "activation_tau",
-    "deactivation_tau",
-    "electrical_stimulation",
-    "activation_floor",
-    "optimal_length",
-    "width_short",
-    "width_long",
-    "series_stretch",
-    "series_shape",
-    "series_limit",
-    "max_velocity",
-    "hill_shape",
-    "eccentric_plateau",
-    "eccentric_slope_ratio",
-    "viscosity",
-    "velocity_activation",
-)
-STRETCH_PARAMETERS = RATE_PARAMETERS[4:]  # those of ``scheme.present_stretch``
+_USER = int(mujoco.mjtDyn.mjDYN_USER)
 
 
 @dataclass(frozen=True)
@@ -78,23 +36,119 @@ class Address:
     Attributes:
         actuator: Actuator id.
         ctrl: Index into ``ctrl``.
-        act: Index of n in ``act``; a and s follow.
+        act: Index of its first state in ``act``.
         out: Index into ``actuator_length``, ``actuator_velocity`` and ``actuator_force``.
+        model: Its muscle model.
     """
 
     actuator: int
     ctrl: int
     act: int
     out: int
+    model: MuscleModel
+
+    def state(self, name: str) -> int:
+        """Index of a named state in ``act``."""
+        return self.act + self.model.state_names.index(name)
+
+
+@dataclass(frozen=True)
+class Group:
+    """All muscles of one model.
+
+    Attributes:
+        model: The muscle model.
+        actuators: Their ids, ascending, shape (n,).
+        columns: Each parameter, shape (n,).
+    """
+
+    model: MuscleModel
+    actuators: NDArray[np.int_]
+    columns: Mapping[str, NDArray[np.float64]]
+
+    def ask(self, equation: Any) -> Any:
+        """The value of an equation of parameters alone, for all muscles at once."""
+        return self.model.ask_columns(equation, self.columns)
+
+
+def has_tag(model: mujoco.MjModel) -> NDArray[np.bool_]:
+    """Which actuators have a tag of mjhill, be it known or not."""
+    tags = model.actuator_dynprm[:, 0]
+    user = model.actuator_dyntype == _USER
+    return np.asarray(np.isin(tags, list(BY_TAG)) | (user & (tags >= TAGS[0]) & (tags < TAGS[1])))
 
 
 def is_muscle(model: mujoco.MjModel, actuator: int) -> bool:
-    """Whether the callbacks serve this actuator: a user actuator, tagged, of three states."""
-    return bool(
-        model.actuator_dyntype[actuator] == mujoco.mjtDyn.mjDYN_USER
-        and model.actuator_dynprm[actuator, 0] == MUSCLE_TAG
-        and model.actuator_actnum[actuator] == STATES
-    )
+    """Whether the callbacks serve an actuator: of user type, tagged, with its model's states."""
+    return muscle_model(model, actuator) is not None
+
+
+def muscle_model(model: mujoco.MjModel, actuator: int) -> MuscleModel | None:
+    """The muscle model of an actuator; None if the callbacks do not serve it."""
+    kind = BY_TAG.get(float(model.actuator_dynprm[actuator, 0]))
+    if kind is None or model.actuator_dyntype[actuator] != _USER:
+        return None
+    wanted = int(_state_counts(model, kind, np.array([actuator]))[0])
+    return kind if model.actuator_actnum[actuator] == wanted else None
+
+
+def muscle_groups(model: mujoco.MjModel) -> list[Group]:
+    """The muscles of a model by muscle model, those that it has."""
+    tags = np.where(model.actuator_dyntype == _USER, model.actuator_dynprm[:, 0], 0.0)
+    groups = []
+    for kind in MODELS:
+        found = np.flatnonzero(tags == kind.tag)
+        if found.size:
+            found = found[model.actuator_actnum[found] == _state_counts(model, kind, found)]
+        if found.size:
+            groups.append(Group(kind, found, _columns(model, kind, found)))
+    return groups
+
+
+def state_count(model: mujoco.MjModel, kind: MuscleModel, actuator: int) -> int:
+    """The number of states that an actuator with the tag of a muscle model must have."""
+    return int(_state_counts(model, kind, np.array([actuator]))[0])
+
+
+def _state_counts(
+    model: mujoco.MjModel, kind: MuscleModel, actuators: NDArray[np.int_]
+) -> NDArray[np.float64]:
+    if not kind.bins:
+        return np.full(len(actuators), float(len(kind.states)))
+    array, slot = kind.slots[kind.bins]
+    return np.asarray(len(kind.states) + getattr(model, f"actuator_{array}")[actuators, slot])
+
+
+def _columns(
+    model: mujoco.MjModel, kind: MuscleModel, actuators: NDArray[np.int_]
+) -> dict[str, NDArray[np.float64]]:
+    rows = {array: getattr(model, f"actuator_{array}")[actuators] for array in ARRAYS}
+    return {name: rows[array][:, slot] for name, (array, slot) in kind.slots.items()}
+
+
+def muscle_ids(model: mujoco.MjModel) -> list[int]:
+    """Actuator ids of the muscles of a model."""
+    ids = [actuator for group in muscle_groups(model) for actuator in group.actuators.tolist()]
+    return sorted(ids)
+
+
+def in_order(groups: list[Group], equation: str) -> tuple[NDArray[np.float64], ...]:
+    """What an equation of parameters gives for all muscles of a model, in the order of their ids.
+
+    Args:
+        groups: Those of ``muscle_groups``, at least one.
+        equation: A field of ``MuscleModel``, or the name of a parameter that all have.
+
+    Returns:
+        Each result, shape (number of muscles,).
+    """
+    order = np.argsort(np.concatenate([group.actuators for group in groups]))
+    found = []
+    for group in groups:
+        stated = getattr(group.model, equation, None)
+        value = group.columns[equation] if stated is None else group.ask(stated)
+        found.append(value if isinstance(value, tuple) else (value,))
+    return tuple(np.concatenate(part)[order] for part in zip(*found, strict=True))
 
 
 def turns(model: mujoco.MjModel, actuator: int) -> bool:
@@ -102,16 +156,6 @@ def turns(model: mujoco.MjModel, actuator: int) -> bool:
     on_joint = model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_JOINT
     joint = model.actuator_trnid[actuator, 0]
     return bool(on_joint and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE)
-
-
-def muscle_ids(model: mujoco.MjModel) -> list[int]:
-    """Actuator ids of the muscles of a model."""
-    found = (
-        (model.actuator_dyntype == int(mujoco.mjtDyn.mjDYN_USER))
-        & (model.actuator_dynprm[:, 0] == MUSCLE_TAG)
-        & (model.actuator_actnum == STATES)
-    )
-    return [int(i) for i in np.flatnonzero(found)]
 
 
 def actuator_names(model: mujoco.MjModel) -> list[str]:
@@ -144,27 +188,27 @@ def address(model: mujoco.MjModel, name: str) -> Address:
     Raises:
         ValueError: No muscle has this name; the message lists those there are.
     """
-    names = muscle_names(model)
-    if name not in names:
-        known = ", ".join(names) or "none"
+    found = dict(addresses(model))
+    if name not in found:
+        known = ", ".join(found) or "none"
         raise ValueError(f"unknown muscle {name!r}; the model's muscles are: {known}")
-    return _address(model, muscle_ids(model)[names.index(name)])
+    return found[name]
 
 
 def addresses(model: mujoco.MjModel) -> Iterator[tuple[str, Address]]:
-    """Name and addresses of each muscle of a model."""
+    """Name and addresses of each muscle of a model, in the order of its actuators."""
     names = actuator_names(model)
     for actuator in muscle_ids(model):
-        yield names[actuator], _address(model, actuator)
-
-
-def _address(model: mujoco.MjModel, actuator: int) -> Address:
-    return Address(
-        actuator,
-        int(model.actuator_ctrladr[actuator]),
-        int(model.actuator_actadr[actuator]),
-        int(model.actuator_outadr[actuator]),
-    )
+        yield (
+            names[actuator],
+            Address(
+                actuator,
+                int(model.actuator_ctrladr[actuator]),
+                int(model.actuator_actadr[actuator]),
+                int(model.actuator_outadr[actuator]),
+                BY_TAG[float(model.actuator_dynprm[actuator, 0])],
+            ),
+        )
 
 
 def moments(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
@@ -176,57 +220,73 @@ def moments(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     return dense
 
 
-def read_muscle(model: mujoco.MjModel, name: str) -> Hill:
+def read_muscle(model: mujoco.MjModel, name: str) -> Muscle:
     """The parameters of a muscle, from the model's arrays.
 
     Raises:
         ValueError: No muscle has this name, or a value is outside its bounds.
     """
-    return _muscle(model, name, address(model, name).actuator)
+    return _muscle(model, name, address(model, name))
 
 
-def read_muscles(model: mujoco.MjModel) -> dict[str, Hill]:
+def read_muscles(model: mujoco.MjModel) -> dict[str, Muscle]:
     """The parameters of all muscles by name.
 
     Raises:
         ValueError: A value is outside its bounds.
     """
-    return {name: _muscle(model, name, at.actuator) for name, at in addresses(model)}
+    return {name: _muscle(model, name, at) for name, at in addresses(model)}
 
 
-def _muscle(model: mujoco.MjModel, name: str, actuator: int) -> Hill:
-    rows = {array: getattr(model, f"actuator_{array}")[actuator] for array in _ARRAYS}
-    values: dict[str, Any] = {
-        parameter: float(rows[array][slot]) for parameter, (array, slot) in SLOTS.items()
-    }
+def _muscle(model: mujoco.MjModel, name: str, at: Address) -> Muscle:
+    rows = {array: getattr(model, f"actuator_{array}")[at.actuator] for array in ARRAYS}
     try:
-        return Hill(**values)
+        return parameters_in(at.model, rows)
     except ValueError as error:
         raise ValueError(f"muscle {name!r}: {error}") from None
 
 
-def parameter_columns(model: mujoco.MjModel, actuators: list[int]) -> dict[str, np.ndarray]:
-    """Each parameter of the given muscles, shape (len(actuators),)."""
-    rows = {array: getattr(model, f"actuator_{array}")[actuators] for array in _ARRAYS}
-    return {name: rows[array][:, slot] for name, (array, slot) in SLOTS.items()}
+def parameters_in(kind: MuscleModel, rows: Mapping[str, Any]) -> Muscle:
+    """The parameters that the rows ``dynprm``, ``gainprm`` and ``biasprm`` hold.
+
+    Raises:
+        ValueError: A value is outside its bounds.
+    """
+    values: dict[str, Any] = {
+        parameter: float(rows[array][slot]) for parameter, (array, slot) in kind.slots.items()
+    }
+    return kind.parameters(**values)
 
 
-def write_muscle(model: mujoco.MjModel, name: str, muscle: Hill) -> None:
+def write_muscle(model: mujoco.MjModel, name: str, muscle: Muscle) -> None:
     """Write the parameters of a muscle into the model's arrays.
 
     Raises:
-        ValueError: No muscle has this name.
+        ValueError: No muscle has this name, or it is one of another muscle model or of another
+            number of states.
     """
-    i = address(model, name).actuator
+    at, kind = address(model, name), model_of(muscle)
+    if kind is not at.model:
+        raise ValueError(
+            f"muscle {name!r} is of the model {at.model.name!r} and was given parameters of "
+            f"{kind.name!r}; load the model again with muscle={kind.name!r}, or give it a "
+            f"mjhill.{at.model.parameters.__name__}"
+        )
+    states = int(model.actuator_actnum[at.actuator])
+    if kind.state_count(muscle) != states:
+        raise ValueError(
+            f"muscle {name!r} has {states} states and was given parameters for "
+            f"{kind.state_count(muscle)}; their number cannot change in a compiled model"
+        )
     for array, row in parameter_rows(muscle).items():
-        getattr(model, f"actuator_{array}")[i] = row
+        getattr(model, f"actuator_{array}")[at.actuator] = row
 
 
-def parameter_rows(muscle: Hill) -> dict[str, np.ndarray]:
+def parameter_rows(muscle: Muscle) -> dict[str, np.ndarray]:
     """The rows ``dynprm``, ``gainprm`` and ``biasprm`` of a muscle, shape (10,) each."""
-    rows = {array: np.zeros(10) for array in _ARRAYS}
-    rows["dynprm"][0] = MUSCLE_TAG
-    for parameter, (array, slot) in SLOTS.items():
+    kind, rows = model_of(muscle), {array: np.zeros(10) for array in ARRAYS}
+    rows["dynprm"][0] = kind.tag
+    for parameter, (array, slot) in kind.slots.items():
         rows[array][slot] = float(getattr(muscle, parameter))
     return rows
 
@@ -234,6 +294,13 @@ def parameter_rows(muscle: Hill) -> dict[str, np.ndarray]:
 def has_passive(model: mujoco.MjModel, joint: int) -> bool:
     """Whether a joint has exponential passive elasticity."""
     return bool(model.nuser_jnt >= NUSER_JNT and model.jnt_user[joint, 0] == PASSIVE_TAG)
+
+
+def elastic_joints(model: mujoco.MjModel) -> Iterator[tuple[str, bool]]:
+    """Joints with passive elasticity, and whether each is a hinge."""
+    for joint, name in enumerate(joint_names(model)):
+        if has_passive(model, joint):
+            yield name, bool(model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE)
 
 
 def read_passive(model: mujoco.MjModel, name: str) -> Passive:
@@ -283,6 +350,3 @@ def joint_id(model: mujoco.MjModel, name: str) -> int:
             f"unknown joint {name!r}; the model's joints are: {', '.join(names) or 'none'}"
         )
     return names.index(name)
-
-
-_ARRAYS = ("dynprm", "gainprm", "biasprm")

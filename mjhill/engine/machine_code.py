@@ -11,21 +11,19 @@ import ctypes
 import hashlib
 from dataclasses import dataclass
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
 
 from mjhill.engine import code_cache
 from mjhill.engine.callbacks import mujoco_library
+from mjhill.engine.equations import source_digest
 from mjhill.engine.structs import verify_fields
 
 CHAIN_SYMBOL = "mjhill_chained_callbacks"  # three pointers: act_dyn, act_bias, passive
 READ_CONTROL = "mj_readCtrl"
 _UNUSED = (ctypes.c_void_p * 3)()
 _NAMES = ("act_dyn", "act_bias", "passive")
-_SOURCES = Path(__file__).parent.parent
-_MADE_FROM = ("elements.py", "muscles/*.py", "engine/*.py")
 
 
 @dataclass(frozen=True)
@@ -84,9 +82,7 @@ def _fingerprint() -> str:
         digest.update(version(package).encode())
     digest.update(llvm.get_host_cpu_name().encode())
     digest.update(llvm.get_host_cpu_features().flatten().encode())
-    for pattern in _MADE_FROM:
-        for source in sorted(_SOURCES.glob(pattern)):
-            digest.update(source.read_bytes())
+    digest.update(source_digest())
     return digest.hexdigest()[:24]
 
 

@@ -7,16 +7,17 @@ from __future__ import annotations
 
 import re
 import sys
+import textwrap
 from pathlib import Path
 from xml.sax.saxutils import escape
 
+import mujoco
 import numpy as np
 
-from mjhill.cli.describe import elastic_joints
 from mjhill.engine.layout import (
     NUSER_JNT,
-    STATES,
     addresses,
+    elastic_joints,
     parameter_rows,
     passive_row,
     read_muscle,
@@ -25,8 +26,8 @@ from mjhill.engine.layout import (
 from mjhill.files import replacing
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import JOINTS
-from mjhill.muscles.readings import steady_stretch
-from mjhill.simulate.load import load
+from mjhill.muscles import MuscleModel, model_of, steady_states
+from mjhill.quantity import quantities
 
 # what a terminal acts upon, or an XML reader takes for a space
 _HIDDEN = re.compile("[\x00-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u206f]")
@@ -40,26 +41,18 @@ _HEAD = """<mujocoinclude>
       <joint damping="{damping}" stiffness="{stiffness}" springref="{rest}" user="{passive}"/>
     </default>
     <!--
-      Slots of mjhill's muscle:
-      dynprm   0 tag                  1 excitation_tau [s]         2 activation_tau [s]
-               3 deactivation_tau [s] 4 electrical_stimulation     5 activation_floor [-]
-      gainprm  0 always 0             1 max_isometric_force [N m]  2 optimal_length [rad]
-               3 width_short [rad]    4 width_long [rad]           5 series_stretch [rad]
-               6 series_shape [-]     7 series_limit [-]
-      biasprm  0 max_velocity [rad/s] 1 hill_shape [-]             2 eccentric_plateau [-]
-               3 eccentric_slope_ratio [-] 4 viscosity [-]         5 velocity_activation [-]
+{slots}
       Each actuator gives its lengthrange, or the compiler would search for it by simulation.
     -->
     <default class="{joint}_muscle">
-      <general dyntype="user" actdim="{states}" gaintype="fixed" biastype="user"
-        ctrllimited="true" ctrlrange="0 1"/>
+      <general dyntype="user" gaintype="fixed" biastype="user" ctrllimited="true" ctrlrange="0 1"/>
     </default>
   </default>
 
   <actuator>
 """
 _MUSCLE = """    <general name="{name}" class="{joint}_muscle" joint="{joint}" gear="{gear}"
-      lengthrange="-1 1"
+      actdim="{states}" lengthrange="-1 1"
       dynprm="{dynprm}"
       gainprm="{gainprm}"
       biasprm="{biasprm}"/>
@@ -67,7 +60,7 @@ _MUSCLE = """    <general name="{name}" class="{joint}_muscle" joint="{joint}" g
 _TAIL = """  </actuator>
 
   <keyframe>
-    <!-- still, both muscles at rest: n, a, s of each -->
+    <!-- still, muscles at rest: the states of each -->
     <key name="home" qpos="{home}" act="{act}"/>
   </keyframe>
 </mujocoinclude>
@@ -79,6 +72,7 @@ def parameters_xml(joint: Joint) -> str:
 
     The joint itself takes the class ``<joint>_plant``; its inertia is that of the bodies.
     """
+    kinds = dict.fromkeys(model_of(muscle) for muscle in joint.muscles.values())
     head = _HEAD.format(
         nuser=NUSER_JNT,
         joint=joint.name,
@@ -86,36 +80,49 @@ def parameters_xml(joint: Joint) -> str:
         stiffness=_text([joint.stiffness]),
         rest=_text([joint.rest_angle]),
         passive=_text(passive_row(joint.passive)),
-        states=STATES,
+        slots="\n".join(_slot_table(kind) for kind in kinds),
     )
     muscles, act = "", []
     for name, muscle in joint.muscles.items():
         gear = joint.gears[name]
         rows = {array: _text(row) for array, row in parameter_rows(muscle).items()}
-        muscles += _MUSCLE.format(name=name, joint=joint.name, gear=_text([gear]), **rows)
+        states = model_of(muscle).state_count(muscle)
+        muscles += _MUSCLE.format(
+            name=name, joint=joint.name, gear=_text([gear]), states=states, **rows
+        )
         length = gear * joint.home_angle
-        act += [0.0, 0.0, length - steady_stretch(muscle, 0.0, length)]
+        act += steady_states(muscle, 0.0, length)
     return head + muscles + _TAIL.format(home=_text([joint.home_angle]), act=_text(act))
 
 
-def snippet(model: str | Path) -> str:
-    """The elements of a joint's model or a file that hold parameters, for pasting into another.
+def _slot_table(kind: MuscleModel) -> str:
+    """A comment that says what the numbers of a muscle model's rows are."""
+    units = {name: quantity.units[0] for name, quantity in quantities(kind.parameters)}
+    rows: dict[str, list[str]] = {"dynprm": ["0 tag"], "gainprm": ["0 always 0"], "biasprm": []}
+    for name, (array, slot) in kind.slots.items():
+        unit = f" [{units[name]}]" if name in units else ""
+        rows[array].append(f"{slot} {name}{unit}")
+    lines = [f"      Slots of the muscle model {kind.name}:"]
+    for array, entries in rows.items():
+        wrapped = textwrap.wrap(", ".join(entries), 80)
+        lines += [f"      {array if k == 0 else '':8} {line}" for k, line in enumerate(wrapped)]
+    return "\n".join(lines)
 
-    Raises:
-        ValueError: As ``load``.
-    """
-    loaded = load(model)
+
+def snippet(loaded: mujoco.MjModel) -> str:
+    """The elements of a model that hold parameters, for pasting into another model's file."""
     lines = []
     for name, _ in elastic_joints(loaded):
         row = passive_row(read_passive(loaded, name))
         lines.append(f'<joint name={_quoted(name)} user="{_text(row)}"/>')
     for name, at in addresses(loaded):
-        rows = parameter_rows(read_muscle(loaded, name))
+        muscle = read_muscle(loaded, name)
+        rows = parameter_rows(muscle)
         gear = f"{loaded.actuator_gear[at.out, 0]:g}"
         lines += [
             f'<general name={_quoted(name)} gear="{gear}" dyntype="user"',
-            f'  actdim="{STATES}" gaintype="fixed" biastype="user" ctrlrange="0 1"',
-            '  lengthrange="-1 1"',
+            f'  actdim="{at.model.state_count(muscle)}" gaintype="fixed" biastype="user"',
+            '  ctrlrange="0 1" lengthrange="-1 1"',
             *(f'  {array}="{_text(row)}"' for array, row in rows.items()),
         ]
         lines[-1] += "/>"

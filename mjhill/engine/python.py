@@ -2,80 +2,77 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import mujoco
 import numpy as np
 
-from mjhill.elements import passive_torque, series_force
+from mjhill.elements import passive_torque
 from mjhill.engine.layout import (
     NUSER_JNT,
-    RATE_PARAMETERS,
     SCALAR_JOINTS,
-    SLOTS,
-    STRETCH_PARAMETERS,
     has_passive,
-    is_muscle,
+    muscle_model,
 )
-from mjhill.muscles.scheme import muscle_rates, present_stretch
+from mjhill.muscles.model import Equation, MuscleModel, arguments
 
 
 def act_dyn(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float | None:
     """Write ``act_dot`` of a muscle; None if the actuator is not one."""
-    if not is_muscle(model, actuator):
+    muscle = muscle_model(model, actuator)
+    if muscle is None:
         return None
-    out = model.actuator_outadr[actuator]
-    act = model.actuator_actadr[actuator]
-    n, a, s = data.act[act : act + 3].tolist()
-    data.act_dot[act : act + 3] = muscle_rates(
-        _is_staged(model),
-        control(model, data, actuator),
-        n,
-        a,
-        s,
-        muscle_length(model, data, actuator),
-        float(data.actuator_velocity[out]),
-        float(model.opt.timestep),
-        *(_parameter(model, actuator, name) for name in RATE_PARAMETERS),
-    )
-    return float(data.act_dot[act + 2])
+    rates = _value(muscle, muscle.rates, model, data, actuator)
+    first, count = model.actuator_actadr[actuator], model.actuator_actnum[actuator]
+    if rates is not None:  # else it has written into state_rates
+        data.act_dot[first : first + count] = rates
+    return float(data.act_dot[first + count - 1])
 
 
 def act_bias(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float | None:
     """Force of a muscle on its joint or tendon; None if the actuator is not one."""
-    if not is_muscle(model, actuator):
+    muscle = muscle_model(model, actuator)
+    if muscle is None:
         return None
-    force, _ = series_force(
-        series_stretch(model, data, actuator),
-        _parameter(model, actuator, "series_stretch"),
-        _parameter(model, actuator, "series_shape"),
-        _parameter(model, actuator, "series_limit"),
-    )
-    # tension is positive in elements; MuJoCo's force is positive when it lengthens the actuator
-    return -force * _parameter(model, actuator, "max_isometric_force")
+    # tension is positive in equations; MuJoCo's force is positive when it lengthens the actuator
+    return -float(_value(muscle, muscle.force, model, data, actuator))
 
 
-def series_stretch(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:
-    """Stretch of the series element now [rad or m]; needs the rates of ``mj_forward``."""
-    s = model.actuator_actadr[actuator] + 2
-    return present_stretch(
-        _is_staged(model),
-        float(data.act[s - 1]),
-        float(data.act[s]),
-        float(data.act_dot[s]),
-        muscle_length(model, data, actuator),
-        float(data.actuator_velocity[model.actuator_outadr[actuator]]),
-        float(model.opt.timestep),
-        *(_parameter(model, actuator, name) for name in STRETCH_PARAMETERS),
-    )
-
-
-def muscle_length(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:
-    """Length of a muscle, less that at ``qpos0`` [rad or m]."""
+def _value(
+    muscle: MuscleModel,
+    equation: Equation,
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    actuator: int,
+) -> Any:
+    """An equation of a muscle, given what it asks for by name."""
     out = model.actuator_outadr[actuator]
-    return float(data.actuator_length[out] - model.actuator_length0[out])
-
-
-def _is_staged(model: mujoco.MjModel) -> bool:
-    return bool(model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4)
+    first, count = model.actuator_actadr[actuator], model.actuator_actnum[actuator]
+    states, rates = data.act[first : first + count], data.act_dot[first : first + count]
+    values = []
+    for name in arguments(equation):
+        if name in muscle.slots:
+            array, slot = muscle.slots[name]
+            values.append(float(getattr(model, f"actuator_{array}")[actuator, slot]))
+        elif name in muscle.state_names:
+            values.append(float(states[muscle.state_names.index(name)]))
+        elif name.removesuffix("_rate") in muscle.state_names:
+            values.append(float(rates[muscle.state_names.index(name.removesuffix("_rate"))]))
+        elif name == "states":
+            values.append(states)
+        elif name == "state_rates":
+            values.append(rates)
+        elif name == "staged":
+            values.append(bool(model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4))
+        elif name == "u":
+            values.append(excitation(model, data, actuator))
+        elif name == "length":
+            values.append(float(data.actuator_length[out] - model.actuator_length0[out]))
+        elif name == "length_rate":
+            values.append(float(data.actuator_velocity[out]))
+        else:
+            values.append(float(model.opt.timestep))
+    return equation(*values)
 
 
 def passive(model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -94,8 +91,8 @@ def passive(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         data.qfrc_passive[dof] += passive_torque(deviation, 0.0, *parameters)
 
 
-def control(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:
-    """The input the engine would use: delayed, clamped to ``ctrlrange``, 0 if it is bad.
+def excitation(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:
+    """The control that the engine would use: delayed, clamped to ``ctrlrange``, 0 if it is bad.
 
     Clamped to [0, 1] last, as the native muscle does.
     """
@@ -115,6 +112,20 @@ def control(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float:
     return min(max(u, 0.0), 1.0)
 
 
-def _parameter(model: mujoco.MjModel, actuator: int, name: str) -> float:
-    array, slot = SLOTS[name]
-    return float(getattr(model, f"actuator_{array}")[actuator, slot])
+def excitations(model: mujoco.MjModel, ctrl: np.ndarray, actuators: list[int]) -> np.ndarray:
+    """``excitation`` of actuators without a delay, all at once.
+
+    Args:
+        model: The model.
+        ctrl: Controls, shape (..., nu).
+        actuators: n actuator ids.
+
+    Returns:
+        Excitations [-], shape (..., n).
+    """
+    addresses = model.actuator_ctrladr[actuators]
+    u = ctrl[..., addresses]
+    if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL:
+        low, high = model.actuator_ctrlrange[addresses].T
+        u = np.where(model.actuator_ctrllimited[addresses], np.clip(u, low, high), u)
+    return np.clip(np.where(np.abs(u) <= mujoco.mjMAXVAL, u, 0.0), 0.0, 1.0)

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import mujoco
 
-from mjhill.engine.layout import NUSER_JNT, STATES, parameter_rows, passive_row
+from mjhill.engine.equilibrium import equilibrate
+from mjhill.engine.layout import (
+    NUSER_JNT,
+    actuator_names,
+    parameter_rows,
+    passive_row,
+    read_muscles,
+)
 from mjhill.joints.joint import Joint, Passive
 from mjhill.joints.system import Coordinate, System
-from mjhill.muscles.hill import Hill
+from mjhill.muscles import Muscle, convert, model_of
 
 
 def joint_spec(joint: Joint) -> mujoco.MjSpec:
@@ -69,7 +76,7 @@ def add_muscle(
     spec: mujoco.MjSpec,
     *,
     name: str,
-    muscle: Hill,
+    muscle: Muscle,
     joint: str | None = None,
     tendon: str | None = None,
     gear: float = 1.0,
@@ -82,7 +89,7 @@ def add_muscle(
     Args:
         spec: The model under construction.
         name: Name of the actuator.
-        muscle: The parameters.
+        muscle: The parameters, of any muscle model, such as ``mjhill.Hill(...)``.
         joint: The joint to act on; this or ``tendon``.
         tendon: The tendon to act on; this or ``joint``.
         gear: Length of the muscle per unit of joint position or tendon length.
@@ -93,6 +100,7 @@ def add_muscle(
     Raises:
         ValueError: The name is taken, the joint or tendon is unknown or not exactly one is
             given, or the gear is 0.
+        TypeError: ``muscle`` is no muscle.
     """
     if (joint is None) == (tendon is None):
         raise ValueError(f"muscle {name!r}: give joint=... or tendon=..., one of the two")
@@ -115,7 +123,7 @@ def add_muscle(
         dyntype=mujoco.mjtDyn.mjDYN_USER,
         gaintype=mujoco.mjtGain.mjGAIN_FIXED,
         biastype=mujoco.mjtBias.mjBIAS_USER,
-        actdim=STATES,
+        actdim=model_of(muscle).state_count(muscle),
         ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
         ctrlrange=[0, 1],
         # given, so that the compiler does not simulate to find it, which it does for user types
@@ -140,3 +148,40 @@ def add_passive(spec: mujoco.MjSpec, *, joint: str, passive: Passive) -> None:
     by_name[joint].userdata = passive_row(passive)
     if spec.nuser_jnt >= 0:  # -1: as long as the longest, found by the compiler
         spec.nuser_jnt = max(spec.nuser_jnt, NUSER_JNT)
+
+
+def with_muscles(spec: mujoco.MjSpec, name: str) -> mujoco.MjModel:
+    """Compile a model with all its muscles as those of another muscle model.
+
+    Poses of its keys stay; there the muscles are steady.
+
+    Raises:
+        ValueError: There is no muscle model of this name, or a muscle cannot be made one of it.
+    """
+    before, changed = spec.compile(), spec.copy()
+    names = actuator_names(before)
+    acts = {
+        names[i]: (int(before.actuator_actadr[i]), int(before.actuator_actnum[i]))
+        for i in range(before.nu)
+    }
+    muscles = read_muscles(before)
+    for k, actuator in enumerate(changed.actuators):
+        if names[k] in muscles:
+            muscle = convert(muscles[names[k]], name)
+            actuator.actdim = model_of(muscle).state_count(muscle)
+            for array, row in parameter_rows(muscle).items():
+                setattr(actuator, array, row)
+    for key in changed.keys:
+        key.act = []
+    after = changed.compile()
+    for k in range(after.nkey):
+        for i, actuator in enumerate(names):
+            if actuator not in muscles:  # keeps the states that the key has
+                at, count = acts[actuator]
+                first = int(after.actuator_actadr[i])
+                after.key_act[k, first : first + count] = before.key_act[k, at : at + count]
+        data = mujoco.MjData(after)
+        mujoco.mj_resetDataKeyframe(after, data, k)
+        equilibrate(after, data)
+        after.key_act[k] = data.act
+    return after

@@ -14,9 +14,9 @@ from mjhill.engine.layout import (
     NUSER_JNT,
     SCALAR_JOINTS,
     has_passive,
+    in_order,
     moments,
-    muscle_ids,
-    parameter_columns,
+    muscle_groups,
 )
 
 PASSIVE_LOAD = 2.0  # passive torque that a movement may meet, in units of the strongest muscle's
@@ -74,6 +74,8 @@ class Plant:
         arms: Change of each muscle's length with y, shape (nmuscle, n).
         slopes: Stiffness of each series element, shape (nmuscle,).
         relaxation: Rate [1/s] at which each contractile element takes up a stretch.
+        drags: Force over velocity of each muscle that has it without a series element,
+            shape (nmuscle,).
         braking: Under RK4, the fastest rate [1/s] at which damping stops a movement, those that
             constraints hold back included, and its joint: RK4 sees the damping there too.
     """
@@ -88,6 +90,7 @@ class Plant:
     arms: _Values
     slopes: _Values
     relaxation: _Values
+    drags: _Values
     braking: tuple[float, int] = (0.0, 0)
 
     @staticmethod
@@ -110,29 +113,25 @@ class Plant:
             self.staged, self.joints[dofs], tuple(self.muscles[k] for k in acting),
             np.eye(len(dofs)), self.mass[square], self.viscosity[square],
             self.elasticity[square], self.arms[np.ix_(acting, dofs)], self.slopes[acting],
-            self.relaxation[acting],
+            self.relaxation[acting], self.drags[acting],
         )  # fmt: skip
 
     @staticmethod
     def _of(model: mujoco.MjModel) -> Plant | None:
-        muscles = muscle_ids(model)
-        if not muscles or not model.nv:
+        groups = muscle_groups(model)
+        if not groups or not model.nv:
             return None
+        muscles = sorted(i for group in groups for i in group.actuators.tolist())
         data = mujoco.MjData(model)
         mujoco.mj_fwdPosition(model, data)
         free = _free(model, data)
         if not free.shape[1]:
             return None
-        columns = parameter_columns(model, muscles)
-        force, hill = columns["max_isometric_force"], columns["hill_shape"]
-        shape = columns["series_shape"]
-        # slope of the series element at F_max [F_max per unit of stretch]
-        slope = shape / columns["series_stretch"] / -np.expm1(-shape)
+        (force,) = in_order(groups, "max_isometric_force")
+        slopes, relaxation, drags = in_order(groups, "at_full_force")
         arms = moments(model, data)[model.actuator_outadr[muscles]]
         mass = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, mass)
-        # slope of force-velocity at rest, isometric, see contractile_velocity
-        yielding = columns["max_velocity"] * hill / (1 + hill * (1 + columns["viscosity"]))
         elasticity = _elasticity(model, np.abs(arms * force[:, None]).max(axis=0))
         damping = np.asarray(model.dof_damping, dtype=np.float64).reshape(model.nv, -1)[:, 0]
         viscosity, elastic = np.diag(damping), np.diag(elasticity)
@@ -143,7 +142,7 @@ class Plant:
             arms = arms @ free
         return Plant(
             staged, model.dof_jntid.copy(), tuple(muscles), free, mass, viscosity, elastic, arms,
-            force * slope, yielding * slope, braking,
+            slopes, relaxation, drags, braking,
         )  # fmt: skip
 
     def overloads(self, timestep: float, limit: float) -> list[Mode]:
@@ -179,7 +178,8 @@ class Plant:
             # shares of a muscle's stiffness that act as a spring's, and the share lost to yielding
             shares = self.slopes * (self.arms @ mode) ** 2 / squares[k]
             lost = shares @ (frequency * self.relaxation / (squares[k] + self.relaxation**2))
-            if lost + mode @ self.viscosity @ mode / frequency < LITTLE:
+            lost += (self.viscosity + self._drag) @ mode @ mode / frequency
+            if lost < LITTLE:
                 found.append(Swing(2 * np.pi / frequency, self._joint(mode)))
         return found
 
@@ -197,15 +197,16 @@ class Plant:
 
         In single-step integrators an oscillation that grows first is one that turns at every
         step. The stretch of a muscle that turns with it is (1 - exp(-z))/z/(1 + exp(-z)) of the
-        way the joint moves in a step, z = h relaxation; MuJoCo takes viscosity implicitly. Where
-        muscles do not yield, the limit is (frequency x timestep)² = 4.
+        way the joint moves in a step, z = h relaxation; MuJoCo takes viscosity implicitly, but not
+        that of muscles. Where muscles do not yield, the limit is (frequency x timestep)² = 4.
         """
         if self.staged:
             springs = (self.arms.T * self.slopes) @ self.arms + self.elasticity
-            stiffness = h * h / _STAGED_SPRING * springs + h / _STAGED_RATE * self.viscosity
-            return stiffness, self.mass
+            damping = self.viscosity + self._drag
+            return h * h / _STAGED_SPRING * springs + h / _STAGED_RATE * damping, self.mass
         springs = (self.arms.T * (self.slopes * self._turning(h))) @ self.arms
-        return h * h * (springs + self.elasticity / 2), 2 * self.mass + h * self.viscosity
+        stiffness = h * h * (springs + self.elasticity / 2) + h * self._drag
+        return stiffness, 2 * self.mass + h * self.viscosity
 
     def _turning(self, h: float) -> _Values:
         z = np.maximum(self.relaxation * h, 1e-12)
@@ -223,13 +224,18 @@ class Plant:
         return int(self.joints[np.argmax(self._energies @ mode * (self.free @ mode))])
 
     @cached_property
+    def _drag(self) -> _Values:
+        """Viscosity that comes from muscles, shape (n, n)."""
+        return (self.arms.T * self.drags) @ self.arms
+
+    @cached_property
     def _energies(self) -> _Values:
         return self.free @ self.mass
 
     def _stiffest(self, mode: _Values, h: float) -> tuple[int, ...]:
         """Up to three muscles that give most of a movement's stiffness, the stiffest first."""
         weights = np.ones(len(self.slopes)) if self.staged else self._turning(h)
-        shares = self.slopes * weights * (self.arms @ mode) ** 2
+        shares = (self.slopes * weights + self.drags / h) * (self.arms @ mode) ** 2
         order = np.argsort(-shares)[:3]
         return tuple(self.muscles[k] for k in order if shares[k] >= 0.3 * shares.max())
 

@@ -14,13 +14,14 @@ from mjhill.engine.checks import Finding
 from mjhill.engine.layout import (
     SCALAR_JOINTS,
     actuator_names,
+    in_order,
     joint_names,
     moments,
+    muscle_groups,
     muscle_ids,
-    parameter_columns,
 )
 
-JUMP = 0.25  # jump of a path, in units of its muscle's series stretch, that is a finding
+JUMP = 0.25  # jump of a path, in units of its muscle's compliance, that is a finding
 _POSITIONS = 100  # at which each joint is looked at
 _POSES = 4  # random poses of the other joints, beside qpos0
 _HALVINGS = 20  # of an interval in which a path seems to jump
@@ -62,12 +63,12 @@ def _finding(
 ) -> Finding:
     hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
     where = f"{math.degrees(place):.3g}°" if hinge else f"{place:.3g} m"
-    stretch = parameter_columns(model, [actuator])["series_stretch"][0]
+    stretch = _compliances(model)[actuator]
     return Finding(
         f"muscle {actuator_names(model)[actuator]!r}",
         f"its length jumps by {1e3 * jump:.3g} mm where joint {joint_names(model)[joint]!r} passes "
-        f"{where} (other joints {others}): its tendon slips off a wrapping geom; the whole force "
-        f"stretches its series element by {1e3 * stretch:.3g} mm",
+        f"{where} (other joints {others}): its tendon slips off a wrapping geom; its whole "
+        f"force comes with a change of length of {1e3 * stretch:.3g} mm",
         "move the geom, its sidesite or the path's sites so that the tendon stays on the geom over "
         "the whole range of the joint, or narrow that range",
         True,
@@ -85,7 +86,8 @@ class _Sweep:
 
     @staticmethod
     def of(model: mujoco.MjModel, muscles: list[int]) -> _Sweep:
-        limits = JUMP * parameter_columns(model, muscles)["series_stretch"]
+        compliances = _compliances(model)
+        limits = JUMP * np.array([compliances[actuator] for actuator in muscles])
         return _Sweep(model, mujoco.MjData(model), model.actuator_outadr[muscles], limits)
 
     def jumps(
@@ -120,6 +122,12 @@ class _Sweep:
         mujoco.mj_transmission(model, data)
         arms = moments(model, data)[self.outs, model.jnt_dofadr[joint]]
         return data.actuator_length[self.outs].copy(), arms
+
+
+def _compliances(model: mujoco.MjModel) -> dict[int, float]:
+    """Change of length by which the force of each muscle goes from 0 to the largest, by id."""
+    (values,) = in_order(muscle_groups(model), "compliance")
+    return dict(zip(muscle_ids(model), values.tolist(), strict=True))
 
 
 def _unexplained(places: _Values, lengths: _Values, arms: _Values) -> _Values:

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from mjhill.frozen import FrozenDict
-from mjhill.muscles.hill import Hill
+from mjhill.muscles import Muscle, convert
+from mjhill.muscles.model import Values
+from mjhill.muscles.parts import exponential_area
 from mjhill.quantity import FORCE, check_quantities, freeze, quantity, sources
 
 
@@ -38,6 +42,18 @@ class Passive:
         freeze(self, "sources")
 
 
+def passive_energy(passive: Passive, deviation: Values) -> Values:
+    """Energy in a joint's exponential elasticity [J] at deviations from its rest [rad or m]."""
+    stored = np.zeros_like(deviation)
+    for k1, k2, sign in (
+        (passive.k1_pos, passive.k2_pos, 1.0),
+        (passive.k1_neg, passive.k2_neg, -1.0),
+    ):
+        beyond = np.maximum(sign * deviation, 0.0)
+        stored += k1 * (exponential_area(k2 * beyond, passive.exponent_limit) / k2 - beyond)
+    return stored
+
+
 @dataclass(frozen=True, kw_only=True)
 class Joint:
     """A joint of the paper: passive plant and an antagonistic pair of muscles.
@@ -67,7 +83,7 @@ class Joint:
     passive: Passive
     range: tuple[float, float]
     home_angle: float
-    muscles: Mapping[str, Hill]
+    muscles: Mapping[str, Muscle]
     gears: Mapping[str, float]
     postures: Mapping[str, float] = field(default_factory=FrozenDict)
     sources: Mapping[str, str] = sources()
@@ -87,3 +103,12 @@ class Joint:
                 raise ValueError(
                     f"{what} must name the muscles {sorted(self.muscles)}, got {sorted(names)}"
                 )
+
+    def with_muscles(self, model: str) -> Joint:
+        """The joint with muscles of another model, such as ``hill-rigid``.
+
+        Raises:
+            ValueError: There is no model of this name, or a muscle cannot be made one of it.
+        """
+        muscles = {name: convert(muscle, model) for name, muscle in self.muscles.items()}
+        return replace(self, muscles=muscles)

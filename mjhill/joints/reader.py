@@ -14,11 +14,11 @@ from types import MappingProxyType
 from typing import Any, TypeVar
 
 from mjhill.joints.joint import Joint, Passive
-from mjhill.muscles.hill import Hill
-from mjhill.quantity import quantities
+from mjhill.muscles import Muscle, model_named
+from mjhill.quantity import flags, quantities
 
 _DATA = Path(__file__).parent / "joints.toml"
-_Made = TypeVar("_Made", Joint, Hill, Passive)
+_Made = TypeVar("_Made", Joint, Muscle, Passive)
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,63}")  # becomes a file's name
 _ENTRY = ("value", "source", "bounds")
 _LONGEST = 1_000_000  # of a parameter file [byte]
@@ -97,7 +97,7 @@ def _joint(name: str, table: Any) -> Joint:
         where = f"{name}.muscles.{_name(muscle, f'{name}.muscles: muscle')}"
         parts = _split(muscle_table, where)
         gears[muscle] = _gear(_taken(parts, "gear", where), f"{where}: gear")
-        muscles[muscle] = _made(Hill, parts, where)
+        muscles[muscle] = _made(_muscle_class(parts.pop("model", "hill"), where), parts, where)
     if not muscles:
         raise ValueError(f"{name}.muscles: there must be at least one muscle; add one")
     postures = _split(values.pop("postures", {}), f"{name}.postures")
@@ -120,6 +120,13 @@ def _joint(name: str, table: Any) -> Joint:
         "home_angle": _angle(_taken(values, "home_angle", name), f"{name}: home_angle"),
     }
     return _made(Joint, values, name)
+
+
+def _muscle_class(model: Any, where: str) -> type[Muscle]:
+    try:
+        return model_named(model).parameters
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{where}: model: {error}") from None
 
 
 def _name(name: str, what: str) -> str:
@@ -248,11 +255,9 @@ def _made(kind: type[_Made], values: dict[str, Any], where: str) -> _Made:
     for name, _ in quantities(kind):
         if name in values:
             values[name] = _number(values[name], f"{where}: {name}")
-    if not isinstance(values.get("electrical_stimulation", False), bool):
-        raise ValueError(
-            f"{where}: electrical_stimulation must be true or false, got "
-            f"{_shown(values['electrical_stimulation'])}"
-        )
+    for name in flags(kind):
+        if not isinstance(values.get(name, False), bool):
+            raise ValueError(f"{where}: {name} must be true or false, got {_shown(values[name])}")
     try:
         return kind(**values)
     except ValueError as error:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from mjhill.frozen import FrozenDict
 from mjhill.joints.joint import Joint, Passive
-from mjhill.muscles.hill import Hill
+from mjhill.muscles import Muscle
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ class System:
 
     name: str
     coordinates: Mapping[str, Coordinate]
-    muscles: Mapping[str, Hill]
+    muscles: Mapping[str, Muscle]
     arms: Mapping[str, Mapping[str, float]] = field(default_factory=FrozenDict)
 
     def __post_init__(self) -> None:

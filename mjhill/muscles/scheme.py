@@ -15,10 +15,8 @@ from math import exp, log, sqrt
 
 from mjhill.elements import (
     activation_rate,
-    active_length_factor,
     contractile_velocity,
     excitation_rate,
-    hypothetical_force,
     series_force,
     velocity_scale,
 )
@@ -43,7 +41,7 @@ def averages(p: float, q: float) -> tuple[float, float]:
 
 
 def advance_excitation(u: float, n: float, tau_nex: float, dt: float) -> float:
-    """Excitation after dt [s] at constant input u; exact."""
+    """Excitation after dt [s] at constant excitation u; exact."""
     return u + (n - u) * exp(-dt / tau_nex)
 
 
@@ -52,6 +50,41 @@ def advance_activation(n: float, n_next: float, a: float, tau: float, dt: float)
     decay = exp(-(dt / tau))
     settled = 1.0 - decay
     return decay * a + settled * n + (n_next - n) * (1.0 - settled * tau * (1.0 / dt))
+
+
+def activation_rates(
+    staged: bool,
+    u: float,
+    n: float,
+    a: float,
+    dt: float,
+    tau_nex: float,
+    tau_act: float,
+    tau_deact: float,
+    stimulated: float,
+) -> tuple[float, float, float]:
+    """Rates [1/s] of n and a for MuJoCo to advance by dt [s], and a one step before.
+
+    ``staged`` is for RK4, whose stages each see a state of their own; then the third is a.
+    Otherwise a one step before is found by going back from the present one. Electrical
+    stimulation puts the excitation u straight into activation (sect. 4.1.2).
+    """
+    source = u if stimulated > 0 else n
+    if staged:
+        # where stages relax faster than 1/dt they overshoot: n and a would leave [0, 1]
+        n_rate = (u - n) / dt if stimulated > 0 else excitation_rate(u, n, max(tau_nex, dt))
+        return n_rate, activation_rate(source, a, max(tau_act, dt), max(tau_deact, dt)), a
+    n_next = advance_excitation(u, source, tau_nex, dt)
+    # not n: at the onset of a release from steady state n is still equal to a
+    tau = tau_act if source + n_next >= 2.0 * a else tau_deact
+    a_next = advance_activation(source, n_next, a, tau, dt)
+    a_then = a - (n - a) * (dt / tau)
+    if stimulated > 0:  # n is the excitation of the step before, so it can be undone exactly
+        decays = dt / (tau_act if n >= a else tau_deact)
+        a_then = n + (a - n) * exp(min(decays, 500.0))  # past 700 it overflows
+        a_then = min(max(a_then, 0.0), 1.0)
+    frequency = 1.0 / dt
+    return (n_next - n) * frequency, (a_next - a) * frequency, a_then
 
 
 def stretch_rate(
@@ -334,110 +367,3 @@ def staged_stretch(
             slope_ratio, viscosity, stretch_max, shape, limit, ahead,
         )  # fmt: skip
     return present, (later - stretch) / whole
-
-
-def muscle_rates(
-    staged: bool,
-    u: float,
-    n: float,
-    a: float,
-    s: float,
-    length: float,
-    length_rate: float,
-    dt: float,
-    tau_nex: float,
-    tau_act: float,
-    tau_deact: float,
-    stimulated: float,
-    floor: float,
-    optimal: float,
-    width_short: float,
-    width_long: float,
-    stretch_max: float,
-    shape: float,
-    limit: float,
-    max_velocity: float,
-    hill: float,
-    plateau: float,
-    slope_ratio: float,
-    viscosity: float,
-    velocity_share: float,
-) -> tuple[float, float, float]:
-    """Rates of n, a and s [1/s, 1/s, length/s] for MuJoCo to advance by a step of dt [s].
-
-    ``staged`` is for RK4, whose stages each see a state of their own: s belongs to the length.
-
-    Under single-step integrators s is one step old, and its rate brings it up to the present
-    length along the way that length has really gone; ``present_stretch`` gives it to the force.
-    (MuJoCo's ``actearly`` does the same with an activation.) Going on from the present along
-    the present velocity instead would miss what the joint accelerates by in a step, which acts
-    as added inertia and is most of the error at long steps. Activation at the start of that
-    step is found by going back from the present one.
-
-    Electrical stimulation puts the input straight into activation (sect. 4.1.2).
-    """
-    source = u if stimulated > 0 else n
-    now = hypothetical_force(
-        a, active_length_factor(length, optimal, width_short, width_long), floor
-    )
-    if staged:
-        # where stages relax faster than 1/dt they overshoot: n and a would leave [0, 1]
-        n_rate = (u - n) / dt if stimulated > 0 else excitation_rate(u, n, max(tau_nex, dt))
-        a_rate = activation_rate(source, a, max(tau_act, dt), max(tau_deact, dt))
-        _, rate = staged_stretch(
-            length - s, length_rate, now, max_velocity, velocity_share, hill, plateau,
-            slope_ratio, viscosity, stretch_max, shape, limit, dt,
-        )  # fmt: skip
-        return n_rate, a_rate, length_rate - rate
-    n_next = advance_excitation(u, source, tau_nex, dt)
-    # not n: at the onset of a release from steady state n is still equal to a
-    tau = tau_act if source + n_next >= 2.0 * a else tau_deact
-    a_next = advance_activation(source, n_next, a, tau, dt)
-    length_then = length - dt * length_rate
-    a_then = a - (n - a) * (dt / tau)
-    if stimulated > 0:  # n is the input of the step before, so it can be undone exactly
-        decays = dt / (tau_act if n >= a else tau_deact)
-        a_then = n + (a - n) * exp(min(decays, 500.0))  # past 700 it overflows
-        a_then = min(max(a_then, 0.0), 1.0)
-    then = hypothetical_force(
-        a_then, active_length_factor(length_then, optimal, width_short, width_long), floor
-    )
-    stretch = advance_stretch(
-        length_then - s, length_rate, then, now, max_velocity, velocity_share, hill, plateau,
-        slope_ratio, viscosity, stretch_max, shape, limit, dt,
-    )  # fmt: skip
-    frequency = 1.0 / dt
-    return (n_next - n) * frequency, (a_next - a) * frequency, (length - stretch - s) * frequency
-
-
-def present_stretch(
-    staged: bool,
-    a: float,
-    s: float,
-    s_rate: float,
-    length: float,
-    length_rate: float,
-    dt: float,
-    floor: float,
-    optimal: float,
-    width_short: float,
-    width_long: float,
-    stretch_max: float,
-    shape: float,
-    limit: float,
-    max_velocity: float,
-    hill: float,
-    plateau: float,
-    slope_ratio: float,
-    viscosity: float,
-    velocity_share: float,
-) -> float:
-    """Stretch of the series element now, whose force acts; see ``muscle_rates``."""
-    if not staged:
-        return length - (s + dt * s_rate)
-    factor = active_length_factor(length, optimal, width_short, width_long)
-    stretch, _ = staged_stretch(
-        length - s, length_rate, hypothetical_force(a, factor, floor), max_velocity,
-        velocity_share, hill, plateau, slope_ratio, viscosity, stretch_max, shape, limit, dt,
-    )  # fmt: skip
-    return stretch

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.frozen import FrozenDict
-from mjhill.muscles.hill import Hill
-from mjhill.muscles.readings import velocity_limit
+from mjhill.muscles import Muscle, model_of
 from mjhill.simulate.recording import Recording, shown
 
 _Values = NDArray[np.float64]
@@ -150,10 +149,13 @@ def energy(recording: Recording) -> Energy:
     def of_model(quantity: str) -> _Values:
         return _gained(recording.series.get(f"model.{quantity}", none))
 
-    def of_muscles(quantity: str) -> FrozenDict[str, _Values]:
-        return FrozenDict(
-            {name: _gained(recording[f"{name}.{quantity}"]) for name in recording.muscles}
-        )
+    def of_muscles(*quantities: str) -> FrozenDict[str, _Values]:
+        """The first of some quantities that each muscle has; 0 without any."""
+        found = {}
+        for name in recording.muscles:
+            known = [f"{name}.{q}" for q in quantities if f"{name}.{q}" in recording.series]
+            found[name] = _gained(recording[known[0]]) if known else none
+        return FrozenDict(found)
 
     elastic = {
         name.removesuffix(".passive_energy"): _gained(values)
@@ -163,7 +165,7 @@ def energy(recording: Recording) -> Energy:
     muscles = recording.muscles.items()
     return Energy(
         time=time,
-        contractile=of_muscles("contractile_work"),
+        contractile=of_muscles("contractile_work", "work"),
         viscosity=FrozenDict({name: _viscosity(recording, name, each) for name, each in muscles}),
         series=of_muscles("series_energy"),
         withheld=FrozenDict({name: _withheld(recording, name) for name in recording.muscles}),
@@ -179,17 +181,14 @@ def energy(recording: Recording) -> Energy:
     )
 
 
-def _viscosity(recording: Recording, name: str, muscle: Hill) -> _Values:
-    """Loss in the viscosity beside the contractile element: viscosity F_max v²/V_max, summed."""
-    velocity = recording[f"{name}.velocity"]
-    scale = np.full(len(recording), muscle.max_velocity)
-    if muscle.velocity_activation:
-        a, length = recording[f"{name}.a"], recording[f"{name}.length"]
-        pairs = zip(a.tolist(), length.tolist(), strict=True)
-        scale = np.array([velocity_limit(muscle, *pair) for pair in pairs])
-    mean = 0.5 * (scale[1:] + scale[:-1])
-    force = muscle.viscosity * muscle.max_isometric_force * velocity[1:] / mean
-    return _summed(force * velocity[1:] * np.diff(recording.time))
+def _viscosity(recording: Recording, name: str, muscle: Muscle) -> _Values:
+    """Loss inside a muscle's contractile element, up to each sample."""
+    recorded = {
+        series.removeprefix(f"{name}."): values
+        for series, values in recording.series.items()
+        if series.startswith(f"{name}.")
+    }
+    return model_of(muscle).viscous_loss(muscle, recording.time, recorded)
 
 
 def _withheld(recording: Recording, name: str) -> _Values:

@@ -8,6 +8,7 @@ import mujoco
 
 from mjhill.engine.checks import check_model
 from mjhill.engine.install import without_python_callbacks
+from mjhill.engine.spec import with_muscles
 from mjhill.joints.reader import JOINTS
 
 _PACKAGE = Path(__file__).parent.parent
@@ -26,7 +27,7 @@ def model_path(joint: str) -> Path:
     return folder / joint / "scene.xml"
 
 
-def load(model: str | Path) -> mujoco.MjModel:
+def load(model: str | Path, muscle: str | None = None) -> mujoco.MjModel:
     """Load and check a model: the name of a joint that comes with mjhill, or an MJCF or MJB file.
 
     The joints that come with mjhill have no gravity, as the movements of the paper;
@@ -35,10 +36,12 @@ def load(model: str | Path) -> mujoco.MjModel:
 
     Args:
         model: A joint's name, such as ``"elbow"``, or a path that ends in .xml or .mjb.
+        muscle: Name of the muscle model that takes the place of ``hill`` in all muscles, such as
+            ``"hill-rigid"``; without it they stay as they are in the file.
 
     Raises:
-        ValueError: There is no such joint or file, MuJoCo cannot compile it, or a muscle in it
-            is not in order; see ``check_model``.
+        ValueError: There is no such joint, file or muscle model, MuJoCo cannot compile it, a
+            muscle in it is not in order (see ``check_model``), or ``muscle`` is given for an .mjb.
     """
     path = Path(model)
     if str(model) in JOINTS:
@@ -48,9 +51,15 @@ def load(model: str | Path) -> mujoco.MjModel:
             f"unknown model {str(model)!r}: no file of that name, and the joints are: "
             f"{', '.join(JOINTS)}"
         )
+    binary = path.suffix == ".mjb"
+    if muscle is not None and binary:
+        raise ValueError(f"{path}: an .mjb cannot change its muscles to {muscle!r}; load the .xml")
     with without_python_callbacks():
-        binary = path.suffix == ".mjb"
-        read = mujoco.MjModel.from_binary_path if binary else mujoco.MjModel.from_xml_path
-        loaded = read(str(path))
+        if muscle is not None:
+            loaded = with_muscles(mujoco.MjSpec.from_file(str(path)), muscle)
+        elif binary:
+            loaded = mujoco.MjModel.from_binary_path(str(path))
+        else:
+            loaded = mujoco.MjModel.from_xml_path(str(path))
     check_model(loaded)
     return loaded

@@ -15,13 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.engine.layout import SCALAR_JOINTS, has_passive, joint_names, muscle_ids, read_passive
-from mjhill.muscles.hill import Hill
-from mjhill.muscles.readings import passive_energy, series_energy, tension_and_stiffness
+from mjhill.joints.joint import passive_energy
 from mjhill.simulate.samples import Samples, has_other_springs
 
 _Values = NDArray[np.float64]
 _GAUSS = ((-np.sqrt(0.6), 5 / 18), (0.0, 8 / 18), (np.sqrt(0.6), 5 / 18))  # nodes and weights
-_NOTICED = 1e-9  # of F_max: difference of tension and applied force that is not rounding
 
 
 @dataclass(frozen=True)
@@ -92,41 +90,6 @@ class Path:
     def power(self, work: _Values, first: float) -> _Values:
         """Mean rate of a work since the sample before [W]; ``first`` for the first sample."""
         return np.concatenate(([first], np.diff(work) / np.diff(self.time)))
-
-
-def muscle_mechanics(
-    muscle: Hill, path: Path, length: _Values, rates: _Values, series: dict[str, _Values]
-) -> Iterator[tuple[str, str, _Values]]:
-    """Name, kind of unit and values of what a muscle's base series imply.
-
-    Args:
-        muscle: The muscle.
-        path: How work is summed.
-        length: Its length, less that at ``qpos0``.
-        rates: Rate of that, as MuJoCo has it.
-        series: Its ``velocity``, ``stretch`` and ``force``.
-    """
-    stretch, force, velocity = series["stretch"], series["force"], series["velocity"]
-    pairs = [tension_and_stiffness(muscle, x) for x in stretch.tolist()]
-    pull, stiffness = np.array(pairs).T.copy()
-    if np.abs(pull - force).max() > _NOTICED * muscle.max_isometric_force:
-        yield "tension", "force", pull
-    else:
-        pull = force
-    energy = series_energy(muscle, stretch)
-    shortened = stretch - length
-    yield "length", "length", length
-    yield "length_rate", "rate", rates
-    yield "contractile_length", "length", -shortened
-    yield "series_stiffness", "stiffness", stiffness
-    yield "series_energy", "energy", energy
-    contractile, whole = path.work(pull, shortened), path.work(force, -length)
-    first, rate = float(velocity[0]), float(rates[0])
-    yield "contractile_power", "power", path.power(contractile, float(pull[0]) * first)
-    yield "series_power", "power", path.power(-energy, -float(pull[0]) * (rate + first))
-    yield "power", "power", path.power(whole, -float(force[0]) * rate)
-    yield "contractile_work", "energy", contractile
-    yield "work", "energy", whole
 
 
 def joint_energies(model: mujoco.MjModel, samples: Samples) -> Iterator[tuple[str, _Values]]:

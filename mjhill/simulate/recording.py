@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.muscles.hill import Hill
+from mjhill.muscles import Muscle
 
 LONGEST_NAME = 10_000
 _UNITLESS = "-"
@@ -35,7 +35,7 @@ class Recording:
     series: Mapping[str, NDArray[np.float64]]
     units: Mapping[str, str]
     about: Mapping[str, str | float] = field(default_factory=dict)
-    muscles: Mapping[str, Hill] = field(default_factory=dict)
+    muscles: Mapping[str, Muscle] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check names and shapes.

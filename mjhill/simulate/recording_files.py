@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.files import replacing
-from mjhill.muscles.hill import Hill
+from mjhill.muscles import Muscle, model_named, model_of
 from mjhill.simulate.recording import Recording
 
 FORMAT = 2  # of both kinds of file; 1 was without the parameters of muscles
@@ -248,7 +248,10 @@ def _array(archive: zipfile.ZipFile, name: str, dimensions: int) -> _Values:
 
 def _told(recording: Recording) -> dict[str, Any]:
     """What a file says beside the series."""
-    muscles = {name: asdict(muscle) for name, muscle in recording.muscles.items()}
+    muscles = {
+        name: {"model": model_of(muscle).name, **asdict(muscle)}
+        for name, muscle in recording.muscles.items()
+    }
     return {"about": dict(recording.about), "muscles": muscles}
 
 
@@ -263,7 +266,7 @@ def _parsed(text: str) -> dict[str, Any]:
     return found
 
 
-def _understood(meta: dict[str, Any]) -> tuple[dict[str, str | float], dict[str, Hill]]:
+def _understood(meta: dict[str, Any]) -> tuple[dict[str, str | float], dict[str, Muscle]]:
     """What a recording is about, and the parameters of its muscles."""
     version = meta.get("format", 1)
     if version not in (1, FORMAT):
@@ -283,8 +286,9 @@ def _understood(meta: dict[str, Any]) -> tuple[dict[str, str | float], dict[str,
     muscles = {}
     for name, values in known.items():
         try:
-            muscles[name] = Hill(**values)
-        except (TypeError, ValueError) as error:
+            kind = model_named(values.pop("model", "hill"))
+            muscles[name] = kind.parameters(**values)
+        except (AttributeError, TypeError, ValueError) as error:
             raise _DamageError(f"damaged recording: muscle {name!r:.50}: {error}") from None
     return about, muscles
 

@@ -12,20 +12,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.elements import (
-    activation_rate,
-    active_length_factor,
-    contractile_velocity,
-    excitation_rate,
-    hypothetical_force,
-    passive_torque,
-    series_force,
-    velocity_scale,
-)
+from mjhill.elements import passive_torque
 from mjhill.joints.joint import Joint
 from mjhill.joints.system import Coordinate, Movement, System
-from mjhill.muscles.hill import Hill
-from mjhill.muscles.readings import shortening_velocity, steady_stretch, tension
+from mjhill.muscles import Muscle, MuscleModel, model_of, steady_states
+from mjhill.muscles.model import arguments, units_of
 from mjhill.simulate.recording import Recording
 from mjhill.simulate.signals import Signal, as_signal, as_signals
 
@@ -58,7 +49,7 @@ def simulate(
         torque: External torque [N·m] or force [N] by coordinate; one value serves a joint.
         movement: Movements of coordinates that are prescribed, by name; the others are free.
         duration: Length of the run [s].
-        start: State at time 0: position and velocity of each coordinate, then n, a, s of each
+        start: State at time 0: position and velocity of each coordinate, then the states of each
             muscle; by default ``rest_state(system)``.
         sample: Interval of the recording [s].
         rtol: Relative tolerance of each step.
@@ -117,7 +108,7 @@ def rest_state(
         excitation: Steady input of each muscle; by default 0.
 
     Returns:
-        Position and velocity of each coordinate, then n, a, s of each muscle.
+        Position and velocity of each coordinate, then the states of each muscle.
     """
     if isinstance(system, Joint):
         angle = system.home_angle if angle is None else angle
@@ -134,8 +125,7 @@ def rest_state(
         state += [positions[name], 0.0]
     for name, muscle in system.muscles.items():
         u = (excitation or {}).get(name, 0.0)
-        length = system.length(name, positions)
-        state += [u, u, length - steady_stretch(muscle, u, length)]
+        state += steady_states(muscle, u, system.length(name, positions))
     return np.array(state)
 
 
@@ -191,9 +181,14 @@ def _rates(
     """The right-hand side between two jumps of the inputs."""
     order = {name: index for index, name in enumerate(system.coordinates)}
     muscles = [
-        (inputs[name], muscle, [(order[joint], arm) for joint, arm in system.arms[name].items()])
+        (
+            inputs[name],
+            _equations(muscle),
+            [(order[j], arm) for j, arm in system.arms[name].items()],
+        )
         for name, muscle in system.muscles.items()
     ]
+    spans = _spans(system)
     coordinates = [
         (coordinate, loads[name], movements.get(name))
         for name, coordinate in system.coordinates.items()
@@ -213,11 +208,10 @@ def _rates(
                 load(now) - coordinate.damping * velocity + _passive(coordinate, position)
             )
             result += [velocity, 0.0]
-        first = 2 * len(coordinates)
-        for index, (signal, muscle, arms) in enumerate(muscles):
-            n, a, s = state[first + 3 * index : first + 3 * index + 3]
+        for (signal, equations, arms), span in zip(muscles, spans, strict=True):
             length = sum([arm * positions[joint] for joint, arm in arms])
-            rows, force = _muscle_rates(muscle, signal(now), n, a, s, length)
+            length_rate = sum([arm * result[2 * joint] for joint, arm in arms])
+            rows, force = equations(signal(now), state[span], length, length_rate)
             result += rows
             for joint, arm in arms:
                 forces[joint] -= arm * force
@@ -229,33 +223,53 @@ def _rates(
     return rates
 
 
-def _muscle_rates(
-    muscle: Hill, u: float, n: float, a: float, s: float, length: float
-) -> tuple[list[float], float]:
-    """Rates of n, a and s, and the muscle's tension."""
-    force, _ = series_force(
-        length - s, muscle.series_stretch, muscle.series_shape, muscle.series_limit
-    )
-    factor = active_length_factor(
-        length, muscle.optimal_length, muscle.width_short, muscle.width_long
-    )
-    hypothetical = hypothetical_force(a, factor, muscle.activation_floor)
-    velocity, _, _, _ = contractile_velocity(
-        force,
-        hypothetical,
-        muscle.hill_shape,
-        muscle.eccentric_plateau,
-        muscle.eccentric_slope_ratio,
-        muscle.viscosity,
-    )
-    velocity *= muscle.max_velocity * velocity_scale(hypothetical, muscle.velocity_activation)
-    source = u if muscle.electrical_stimulation else n
-    rates = [
-        excitation_rate(u, n, muscle.excitation_tau),
-        activation_rate(source, a, muscle.activation_tau, muscle.deactivation_tau),
-        -velocity,
-    ]
-    return rates, muscle.max_isometric_force * force
+def _spans(system: System) -> list[slice]:
+    """Where the states of each muscle are."""
+    first, spans = 2 * len(system.coordinates), []
+    for muscle in system.muscles.values():
+        count = model_of(muscle).state_count(muscle)
+        spans.append(slice(first, first + count))
+        first += count
+    return spans
+
+
+def _equations(
+    muscle: Muscle,
+) -> Callable[[float, list[float], float, float], tuple[list[float], float]]:
+    """A muscle's rates and tension, as a function of u, its states, length and length rate."""
+    model = model_of(muscle)
+    if "states" in arguments(model.derivatives):
+        return _array_equations(model, muscle)
+    order = ("u", *model.state_names, "length", "length_rate")
+    derivatives = model.bound(model.derivatives, muscle, order)
+    tension = model.bound(model.tension, muscle, order)
+
+    def values(
+        u: float, states: list[float], length: float, length_rate: float
+    ) -> tuple[list[float], float]:
+        given = (u, *states, length, length_rate)
+        return [*derivatives(*given)], tension(*given)
+
+    return values
+
+
+def _array_equations(
+    model: MuscleModel, muscle: Muscle
+) -> Callable[[float, list[float], float, float], tuple[list[float], float]]:
+    order = ("states", "state_rates", "u", *model.state_names, "length", "length_rate")
+    derivatives = model.bound(model.derivatives, muscle, order)
+    tension = model.bound(model.tension, muscle, order)
+
+    def values(
+        u: float, states: list[float], length: float, length_rate: float
+    ) -> tuple[list[float], float]:
+        array, rates = np.array(states), np.zeros(len(states))
+        named = states[: len(model.states)]
+        given = (array, rates, u, *named, length, length_rate)
+        derivatives(*given)
+        return rates.tolist(), tension(*given)
+
+    return values
 
 
 def _knots(breaks: Iterable[tuple[float, ...]], end: float) -> list[float]:
@@ -313,25 +327,36 @@ def _recorded(
         series[f"{name}.applied"] = np.array([load(time) for time in times])
         units[f"{name}.applied"] = "N" if system.coordinates[name].slide else "N·m"
     order = {name: 2 * index for index, name in enumerate(system.coordinates)}
-    first = 2 * len(system.coordinates)
-    for index, (name, muscle) in enumerate(system.muscles.items()):
-        n, a, s = states[:, first + 3 * index : first + 3 * index + 3].T
+    for (name, muscle), span in zip(system.muscles.items(), _spans(system), strict=True):
         arms = system.arms[name].items()
-        length = np.sum([arm * states[:, order[joint]] for joint, arm in arms], axis=0)
-        rows = list(zip(a.tolist(), length.tolist(), (length - s).tolist(), strict=True))
-        unit, effort = ("m", "N") if system.slides(name) else ("rad", "N·m")
-        columns = {
-            "u": ("-", np.array([inputs[name](time) for time in times])),
-            "n": ("-", n),
-            "a": ("-", a),
-            "velocity": (
-                f"{unit}/s",
-                np.array([shortening_velocity(muscle, *row) for row in rows]),
-            ),
-            "stretch": (unit, length - s),
-            "force": (effort, np.array([tension(muscle, stretch) for _, _, stretch in rows])),
-        }
+        lengths = np.sum([arm * states[:, order[joint]] for joint, arm in arms], axis=0)
+        length_rates = np.sum([arm * states[:, order[joint] + 1] for joint, arm in arms], axis=0)
+        u = np.array([inputs[name](time) for time in times])
+        columns = _muscle_series(muscle, u, states[:, span], lengths, length_rates)
+        kinds = units_of(not system.slides(name))
         for quantity, (kind, values) in columns.items():
-            series[f"{name}.{quantity}"], units[f"{name}.{quantity}"] = values, kind
+            series[f"{name}.{quantity}"], units[f"{name}.{quantity}"] = values, kinds[kind]
     about: dict[str, str | float] = {"joint": system.name, "solver": f"SciPy {solver}"}
     return Recording(times, {k: np.ascontiguousarray(v) for k, v in series.items()}, units, about)
+
+
+def _muscle_series(
+    muscle: Muscle, u: _Vector, states: _Vector, lengths: _Vector, length_rates: _Vector
+) -> dict[str, tuple[str, _Vector]]:
+    """Kind of unit and values of each series of a muscle, by quantity."""
+    model, equations = model_of(muscle), _equations(muscle)
+    columns = {"u": ("-", u)}
+    for k, state in enumerate(model.states):
+        if state.share:
+            columns[state.name] = "-", states[:, k]
+    rows = list(
+        zip(u.tolist(), states.tolist(), lengths.tolist(), length_rates.tolist(), strict=True)
+    )
+    readings = [
+        model.reading(muscle, dict(zip(model.state_names, row[1], strict=False)), *row[2:])
+        for row in rows
+    ]
+    for quantity, (kind, _) in readings[0].items():
+        columns[quantity] = kind, np.array([reading[quantity][1] for reading in readings])
+    columns["force"] = "force", np.array([equations(*row)[1] for row in rows])
+    return columns

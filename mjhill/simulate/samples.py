@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.engine.layout import SCALAR_JOINTS, muscle_ids
-from mjhill.engine.python import control
+from mjhill.engine.python import excitation
 
 _Values = NDArray[np.float64]
 _COPIED = (  # arrays of data that are kept as they are
@@ -107,7 +107,7 @@ class Sampler:
         if data.xfrc_applied.any():
             self._pushed[row] = _generalised(self._model, data)
         for actuator, values in self._delayed.items():
-            values[row] = control(self._model, data, actuator)
+            values[row] = excitation(self._model, data, actuator)
         if self._staged:
             self._moved(row, data.qvel)
 

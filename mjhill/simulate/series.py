@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import mujoco
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from mjhill.engine.install import installed_backend
 from mjhill.engine.layout import (
-    STRETCH_PARAMETERS,
     Address,
     actuator_names,
     addresses,
@@ -20,9 +19,10 @@ from mjhill.engine.layout import (
     read_muscles,
     turns,
 )
-from mjhill.muscles.hill import Hill
-from mjhill.muscles.scheme import present_stretch
-from mjhill.simulate.mechanics import Path, joint_energies, model_mechanics, muscle_mechanics
+from mjhill.engine.python import excitations
+from mjhill.muscles import Muscle
+from mjhill.muscles.model import Track, units_of
+from mjhill.simulate.mechanics import Path, joint_energies, model_mechanics
 from mjhill.simulate.recording import Recording
 from mjhill.simulate.samples import Samples
 
@@ -94,69 +94,38 @@ def _joint_series(model: mujoco.MjModel, samples: Samples, joint: int, name: str
 
 
 def _muscle_series(
-    model: mujoco.MjModel, samples: Samples, at: Address, muscle: Hill, path: Path
+    model: mujoco.MjModel, samples: Samples, at: Address, muscle: Muscle, path: Path
 ) -> _Series:
     """Quantity, unit and values of each series of a muscle but its moment arms."""
-    effort, unit = ("N·m", "rad") if turns(model, at.actuator) else ("N", "m")
-    units = {
-        "force": effort,
-        "length": unit,
-        "rate": f"{unit}/s",
-        "stiffness": f"{effort}/{unit}",
-        "energy": "J",
-        "power": "W",
-    }
-    length = samples.column("actuator_length", at.out) - model.actuator_length0[at.out]
-    n, a, s = (samples.column("act", at.act + k) for k in range(3))
-    s_rate = samples.column("act_dot", at.act + 2)
-    rate = samples.column("actuator_velocity", at.out)
-    stretch = _stretch(model, muscle, a, s, s_rate, length, rate)
-    shortening = np.diff(stretch - length) / np.diff(samples.time)
-    base = {
-        "velocity": np.concatenate(([-s_rate[0]], shortening)),
-        "stretch": stretch,
+    units = units_of(turns(model, at.actuator))
+    u = _excitation(model, samples, at)
+    track = Track(
+        muscle=muscle,
+        time=samples.time,
+        timestep=float(model.opt.timestep),
+        staged=bool(model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4),
+        u=u,
+        states={name: samples.column("act", at.state(name)) for name in at.model.state_names},
+        state_rates={
+            name: samples.column("act_dot", at.state(name)) for name in at.model.state_names
+        },
+        length=samples.column("actuator_length", at.out) - model.actuator_length0[at.out],
+        length_rate=samples.column("actuator_velocity", at.out),
         # MuJoCo's force is negative when it pulls; no negative zeros
-        "force": 0.0 - samples.column("actuator_force", at.out),
-    }
-    yield "u", "-", _input(model, samples, at)
-    yield "n", "-", n
-    yield "a", "-", a
-    yield "velocity", f"{unit}/s", base["velocity"]
-    yield "stretch", unit, stretch
-    yield "force", effort, base["force"]
-    for quantity, kind, values in muscle_mechanics(muscle, path, length, rate, base):
+        force=0.0 - samples.column("actuator_force", at.out),
+        work=path.work,
+        power=path.power,
+    )
+    yield "u", "-", u
+    for quantity, kind, values in at.model.series(track):
         yield quantity, units[kind], values
 
 
-def _stretch(
-    model: mujoco.MjModel,
-    muscle: Hill,
-    a: _Values,
-    s: _Values,
-    s_rate: _Values,
-    length: _Values,
-    rate: _Values,
-) -> _Values:
-    """Stretch of the series element at each sample, as the callbacks have it."""
-    dt = float(model.opt.timestep)
-    stretched: Callable[..., Any] = present_stretch
-    parameters = [getattr(muscle, p) for p in STRETCH_PARAMETERS]
-    if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:
-        # plain arithmetic, which arrays can do too
-        return np.asarray(stretched(False, a, s, s_rate, length, rate, dt, *parameters))
-    rows = zip(*(column.tolist() for column in (a, s, s_rate, length, rate)), strict=True)
-    return np.array([stretched(True, *row, dt, *parameters) for row in rows])
-
-
-def _input(model: mujoco.MjModel, samples: Samples, at: Address) -> _Values:
-    """Input of a muscle as the callbacks use it; see ``control``."""
+def _excitation(model: mujoco.MjModel, samples: Samples, at: Address) -> _Values:
+    """Excitation of a muscle as the callbacks use it; see ``python.excitation``."""
     if at.actuator in samples.delayed:
         return samples.delayed[at.actuator]
-    u = samples.column("ctrl", at.ctrl)
-    clamped = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
-    if clamped and model.actuator_ctrllimited[at.ctrl]:
-        u = np.clip(u, *model.actuator_ctrlrange[at.ctrl])
-    return np.clip(np.where(np.abs(u) <= mujoco.mjMAXVAL, u, 0.0), 0.0, 1.0)
+    return np.ascontiguousarray(excitations(model, samples.arrays["ctrl"], [at.actuator])[:, 0])
 
 
 def _other_series(model: mujoco.MjModel, samples: Samples, actuator: int) -> _Series:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.engine.equilibrium import STRONGEST
-from mjhill.muscles.hill import Hill
+from mjhill.muscles import Muscle, model_of
+from mjhill.muscles.model import STRONGEST
 from mjhill.simulate.recording import Recording
 
 FASTEST = 1.5  # V_max
@@ -91,25 +91,23 @@ def transients(recording: Recording) -> tuple[Transient, ...]:
     )
 
 
-def _of_muscle(recording: Recording, name: str, muscle: Hill) -> Iterator[Transient]:
+def _of_muscle(recording: Recording, name: str, muscle: Muscle) -> Iterator[Transient]:
     force = recording[f"{name}.force"]
     tension = recording.series.get(f"{name}.tension", force)
     velocity, rate = recording[f"{name}.velocity"], recording[f"{name}.length_rate"]
-    fastest = FASTEST * muscle.max_velocity
+    unit = recording.units[f"{name}.length_rate"]
+    model = model_of(muscle)
+    largest = model.ask(model.max_velocity, muscle) if model.max_velocity else np.inf
+    fastest = FASTEST * largest
     if recording.about.get("integrator") == "mjINT_RK4" and len(recording) > 1:
         # its force is that of a stretch a little later, see staged_stretch; not always equally so
-        fastest += _LEAD * muscle.series_stretch / float(np.diff(recording.time).min())
+        compliance = model.ask(model.compliance, muscle)
+        fastest += _LEAD * compliance / float(np.diff(recording.time).min())
     before = np.concatenate((rate[:1], rate[:-1]))
-    # the least that V_max can scale to
-    slowest = muscle.max_velocity * (
-        1.0 - muscle.velocity_activation * (1.0 - muscle.activation_floor)
-    )
-    stretched = np.maximum.accumulate(np.maximum(rate, 0.0)) / slowest
-    carried = muscle.max_isometric_force * (
-        _MARGIN * muscle.eccentric_plateau + muscle.viscosity * stretched
-    )
-    held = carried
-    carried = np.minimum(carried, STRONGEST * muscle.max_isometric_force)
+    lengthened = np.maximum.accumulate(np.maximum(rate, 0.0))
+    slow, more = model.ask(model.lengthening, muscle)
+    held = _MARGIN * slow + more * lengthened
+    carried = np.minimum(held, STRONGEST * muscle.max_isometric_force)
     checks = {  # values, what they have too much, what is possible
         "force": (tension, tension - carried, carried),
         "velocity": (
@@ -128,7 +126,7 @@ def _of_muscle(recording: Recording, name: str, muscle: Hill) -> Iterator[Transi
         worst = int(np.argmax(np.where(beyond, np.nan_to_num(excess, nan=np.inf), -np.inf)))
         cause, remedy = _reason(kind, worst, jumped)
         if kind == "force" and tension[worst] <= held[worst]:
-            cause = f"it is lengthened at up to {stretched[worst]:.3g} times V_max, which tears it"
+            cause = f"it is lengthened at up to {lengthened[worst]:.3g} {unit}, which tears it"
             remedy = "look for an inertia, a speed or a max_velocity that is too small or too large"
         yield Transient(
             name, kind, float(recording.time[worst]), float(values[worst]), float(limits[worst]),
@@ -142,7 +140,8 @@ def _explained(recording: Recording, name: str, sound: NDArray[np.bool_]) -> _Va
 
     The joints move, or the series element recoils from a force that was ``sound``.
     """
-    rate, stretch = recording[f"{name}.length_rate"], recording[f"{name}.stretch"]
+    rate = recording[f"{name}.length_rate"]
+    stretch = recording.series.get(f"{name}.stretch", np.zeros_like(rate))
     before = np.concatenate((rate[:1], rate[:-1]))
     recoil = np.where(sound[:-1], -np.diff(stretch) / np.diff(recording.time), 0.0)
     at_first = np.inf if sound[0] else 0.0

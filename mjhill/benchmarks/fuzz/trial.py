@@ -17,7 +17,7 @@ from mjhill.benchmarks.fuzz.draws import Random, chance, log_uniform
 from mjhill.benchmarks.fuzz.models import KINDS, random_model
 from mjhill.engine.checks import Finding, check_model
 from mjhill.engine.equilibrium import check_states, equilibrate
-from mjhill.engine.layout import STATES, addresses, muscle_ids, parameter_columns
+from mjhill.engine.layout import addresses, in_order, muscle_groups
 from mjhill.engine.tendons import check_tendons
 from mjhill.simulate.run import record
 from mjhill.simulate.signals import Signal
@@ -249,13 +249,19 @@ def impossible(
     failures = [mujoco.mjtWarning(int(i)).name[2:] for i in np.flatnonzero(warned)]
     if not (np.isfinite(states).all() and np.isfinite(tension).all()):
         failures.append("not finite")
-    muscles = muscle_ids(model)
-    act = states[:, -model.na :].reshape(len(states), len(muscles), STATES)
-    if (act[..., :2] < -ROUNDING).any() or (act[..., :2] > 1 + ROUNDING).any():
+    shares = [
+        states.shape[1] - model.na + at.state(state.name)
+        for _, at in addresses(model)
+        for state in at.model.states
+        if state.share
+    ]
+    act = states[:, shares]
+    if (act < -ROUNDING).any() or (act > 1 + ROUNDING).any():
         failures.append("n or a outside")
     if (tension < 0).any():
         failures.append("pushes")
-    if (tension > STRONGEST * parameter_columns(model, muscles)["max_isometric_force"]).any():
+    (force,) = in_order(muscle_groups(model), "max_isometric_force")
+    if (tension > STRONGEST * force).any():
         failures.append("too strong")
     return tuple(failures)
 
