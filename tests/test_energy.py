@@ -19,7 +19,8 @@ from conftest import rest
 import mjhill
 from mjhill.benchmarks import balance
 from mjhill.engine.spec import joint_spec
-from mjhill.muscles.readings import isometric_share, passive_energy, series_energy, tension
+from mjhill.joints.joint import passive_energy
+from mjhill.muscles.readings import isometric_share, series_energy, tension
 from mjhill.simulate.reference import plant_torque
 
 SYSTEMS = ("elbow", "wrist", "knee", "ankle", "eye", 0, 1, 2, 3)  # numbers: variants of the elbow

@@ -94,7 +94,7 @@ def drawn_muscles(model: mujoco.MjModel, recording: Recording | None) -> tuple[D
         if force is None or not recorded:
             continue
         colour = MUSCLE_COLOURS[len(found) % len(MUSCLE_COLOURS)]
-        kind = layout.muscle_model(model, i)
+        kind = layout.model_of_actuator(model, i)
         activation = int(model.actuator_actadr[i])  # of the native muscle's only state
         if kind is not None:
             activation += kind.state_names.index(kind.activation)
@@ -193,7 +193,7 @@ def hide_tendons(model: mujoco.MjModel, muscles: Iterable[DrawnMuscle]) -> None:
 
 
 def _max_force(model: mujoco.MjModel, actuator: int) -> float | None:
-    kind = layout.muscle_model(model, actuator)
+    kind = layout.model_of_actuator(model, actuator)
     if kind is not None:
         array, slot = kind.slots["max_isometric_force"]
         return float(getattr(model, f"actuator_{array}")[actuator, slot])

@@ -80,10 +80,10 @@ def has_tag(model: mujoco.MjModel) -> NDArray[np.bool_]:
 
 def is_muscle(model: mujoco.MjModel, actuator: int) -> bool:
     """Whether the callbacks serve an actuator: of user type, tagged, with its model's states."""
-    return muscle_model(model, actuator) is not None
+    return model_of_actuator(model, actuator) is not None
 
 
-def muscle_model(model: mujoco.MjModel, actuator: int) -> MuscleModel | None:
+def model_of_actuator(model: mujoco.MjModel, actuator: int) -> MuscleModel | None:
     """The muscle model of an actuator; None if the callbacks do not serve it."""
     kind = BY_TAG.get(float(model.actuator_dynprm[actuator, 0]))
     if kind is None or model.actuator_dyntype[actuator] != _USER:

@@ -104,9 +104,10 @@ def _slot_table(kind: MuscleModel) -> str:
         rows[array].append(f"{slot} {name}{unit}")
     lines = [f"      Slots of the muscle model {kind.name}:"]
     for array, entries in rows.items():
-        wrapped = textwrap.wrap(", ".join(entries), 80)
+        # no break between a number and its name
+        wrapped = textwrap.wrap(", ".join(entry.replace(" ", "\xa0") for entry in entries), 80)
         lines += [f"      {array if k == 0 else '':8} {line}" for k, line in enumerate(wrapped)]
-    return "\n".join(lines)
+    return "\n".join(lines).replace("\xa0", " ")
 
 
 def snippet(loaded: mujoco.MjModel) -> str:

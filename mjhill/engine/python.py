@@ -12,14 +12,14 @@ from mjhill.engine.layout import (
     NUSER_JNT,
     SCALAR_JOINTS,
     has_passive,
-    muscle_model,
+    model_of_actuator,
 )
 from mjhill.muscles.model import Equation, MuscleModel, arguments
 
 
 def act_dyn(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float | None:
     """Write ``act_dot`` of a muscle; None if the actuator is not one."""
-    muscle = muscle_model(model, actuator)
+    muscle = model_of_actuator(model, actuator)
     if muscle is None:
         return None
     rates = _value(muscle, muscle.rates, model, data, actuator)
@@ -31,7 +31,7 @@ def act_dyn(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float 
 
 def act_bias(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> float | None:
     """Force of a muscle on its joint or tendon; None if the actuator is not one."""
-    muscle = muscle_model(model, actuator)
+    muscle = model_of_actuator(model, actuator)
     if muscle is None:
         return None
     # tension is positive in equations; MuJoCo's force is positive when it lengthens the actuator

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mjhill.frozen import FrozenDict
-from mjhill.muscles import Muscle, convert
+from mjhill.muscles import Muscle, convert, model_of
+from mjhill.muscles.hill import Hill
 from mjhill.muscles.model import Values
 from mjhill.muscles.parts import exponential_area
 from mjhill.quantity import FORCE, check_quantities, freeze, quantity, sources
@@ -103,6 +104,22 @@ class Joint:
                 raise ValueError(
                     f"{what} must name the muscles {sorted(self.muscles)}, got {sorted(names)}"
                 )
+
+    @property
+    def hill_muscles(self) -> Mapping[str, Hill]:
+        """The muscles, for what needs those of the model ``hill``.
+
+        Raises:
+            ValueError: A muscle is of another model.
+        """
+        hills = {name: muscle for name, muscle in self.muscles.items() if isinstance(muscle, Hill)}
+        for name, muscle in self.muscles.items():
+            if name not in hills:
+                raise ValueError(
+                    f"{self.name}: {name!r} is a muscle of the model {model_of(muscle).name!r}, "
+                    "and this needs one of the model 'hill'"
+                )
+        return FrozenDict(hills)
 
     def with_muscles(self, model: str) -> Joint:
         """The joint with muscles of another model, such as ``hill-rigid``.

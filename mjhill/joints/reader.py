@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Any, TypeVar
 
 from mjhill.joints.joint import Joint, Passive
-from mjhill.muscles import Muscle, model_named
+from mjhill.muscles import Muscle, muscle_model
 from mjhill.quantity import flags, quantities
 
 _DATA = Path(__file__).parent / "joints.toml"
@@ -124,7 +124,7 @@ def _joint(name: str, table: Any) -> Joint:
 
 def _muscle_class(model: Any, where: str) -> type[Muscle]:
     try:
-        return model_named(model).parameters
+        return muscle_model(model).parameters
     except (TypeError, ValueError) as error:
         raise ValueError(f"{where}: model: {error}") from None
 

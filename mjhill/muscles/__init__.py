@@ -18,7 +18,7 @@ _BY_NAME = {model.name: model for model in MODELS}
 _BY_PARAMETERS = {model.parameters: model for model in MODELS}
 
 
-def model_named(name: str) -> MuscleModel:
+def muscle_model(name: str) -> MuscleModel:
     """A muscle model by its name.
 
     Raises:
@@ -60,7 +60,7 @@ def convert(muscle: Muscle, name: str) -> Muscle:
         ValueError: There is no model of this name, or the muscle is not of the model ``hill``,
             from which others are made.
     """
-    model = model_named(name)
+    model = muscle_model(name)
     if type(muscle) is model.parameters:
         return muscle
     if not isinstance(muscle, hill.Hill):

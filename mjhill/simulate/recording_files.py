@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.files import replacing
-from mjhill.muscles import Muscle, model_named, model_of
+from mjhill.muscles import Muscle, muscle_model, model_of
 from mjhill.simulate.recording import Recording
 
 FORMAT = 2  # of both kinds of file; 1 was without the parameters of muscles
@@ -286,7 +286,7 @@ def _understood(meta: dict[str, Any]) -> tuple[dict[str, str | float], dict[str,
     muscles = {}
     for name, values in known.items():
         try:
-            kind = model_named(values.pop("model", "hill"))
+            kind = muscle_model(values.pop("model", "hill"))
             muscles[name] = kind.parameters(**values)
         except (AttributeError, TypeError, ValueError) as error:
             raise _DamageError(f"damaged recording: muscle {name!r:.50}: {error}") from None

@@ -126,7 +126,10 @@ def _of_muscle(recording: Recording, name: str, muscle: Muscle) -> Iterator[Tran
         worst = int(np.argmax(np.where(beyond, np.nan_to_num(excess, nan=np.inf), -np.inf)))
         cause, remedy = _reason(kind, worst, jumped)
         if kind == "force" and tension[worst] <= held[worst]:
-            cause = f"it is lengthened at up to {lengthened[worst]:.3g} {unit}, which tears it"
+            speed = f"{lengthened[worst]:.3g} {unit}"
+            if model.max_velocity:
+                speed += f", {lengthened[worst] / largest:.3g} times V_max"
+            cause = f"it is lengthened at up to {speed}, which tears it"
             remedy = "look for an inertia, a speed or a max_velocity that is too small or too large"
         yield Transient(
             name, kind, float(recording.time[worst]), float(values[worst]), float(limits[worst]),
