@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.files import replacing
-from mjhill.muscles import Muscle, muscle_model, model_of
+from mjhill.muscles import Muscle, model_of, muscle_model
 from mjhill.simulate.recording import Recording
 
 FORMAT = 2  # of both kinds of file; 1 was without the parameters of muscles

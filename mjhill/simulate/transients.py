@@ -94,7 +94,8 @@ def transients(recording: Recording) -> tuple[Transient, ...]:
 def _of_muscle(recording: Recording, name: str, muscle: Muscle) -> Iterator[Transient]:
     force = recording[f"{name}.force"]
     tension = recording.series.get(f"{name}.tension", force)
-    velocity, rate = recording[f"{name}.velocity"], recording[f"{name}.length_rate"]
+    rate = recording[f"{name}.length_rate"]
+    velocity = recording.series.get(f"{name}.velocity", np.zeros_like(rate))
     unit = recording.units[f"{name}.length_rate"]
     model = model_of(muscle)
     largest = model.ask(model.max_velocity, muscle) if model.max_velocity else np.inf
@@ -133,7 +134,7 @@ def _of_muscle(recording: Recording, name: str, muscle: Muscle) -> Iterator[Tran
             remedy = "look for an inertia, a speed or a max_velocity that is too small or too large"
         yield Transient(
             name, kind, float(recording.time[worst]), float(values[worst]), float(limits[worst]),
-            recording.units[f"{name}.{'velocity' if kind == 'velocity' else 'force'}"],
+            unit if kind == "velocity" else recording.units[f"{name}.force"],
             int(beyond.sum()), float(recording.time[np.argmax(beyond)]), cause, remedy,
         )  # fmt: skip
 
