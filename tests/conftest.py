@@ -1,5 +1,6 @@
 import ctypes
 import os
+import signal
 
 os.environ["MJHILL_AUTOLOAD"] = "0"  # tests install what they need; test_autoload takes it out
 
@@ -9,6 +10,9 @@ import pytest
 import mjhill
 from mjhill.engine.callbacks import mujoco_library
 from mjhill.engine.spec import joint_spec
+
+# shells start background jobs with Ctrl-C ignored; the processes that tests start must not be
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 CALLBACKS = ("mjcb_act_dyn", "mjcb_act_bias", "mjcb_passive")
 
