@@ -18,11 +18,11 @@ from mjhill.engine.layout import (
     Group,
     actuator_names,
     has_tag,
+    ids_of,
     in_order,
     joint_names,
     moments,
     muscle_groups,
-    muscle_ids,
     read_muscles,
     read_passive,
     state_count,
@@ -83,7 +83,8 @@ def check_model(model: mujoco.MjModel) -> tuple[Finding, ...]:
         RuntimeWarning: A finding is severe.
     """
     names = actuator_names(model)
-    muscles, groups = muscle_ids(model), muscle_groups(model)
+    groups = muscle_groups(model)
+    muscles = ids_of(groups)
     half = has_tag(model)
     half[muscles] = ~_whole(model)[muscles]
     for actuator in np.flatnonzero(half).tolist():

@@ -10,17 +10,17 @@ import numpy as np
 from mjhill.elements import passive_torque
 from mjhill.engine.layout import (
     NUSER_JNT,
+    Group,
     actuator_names,
-    addresses,
     has_passive,
+    ids_of,
     in_order,
     joint_names,
     muscle_groups,
-    read_muscles,
     read_passive,
 )
 from mjhill.engine.python import excitation, excitations
-from mjhill.muscles.model import STRONGEST, arguments
+from mjhill.muscles.model import STRONGEST
 
 ROUNDING = 1e-6  # by which n and a may be outside [0, 1]
 
@@ -60,19 +60,18 @@ def equilibrate(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     check_finite(data)
     mujoco.mj_fwdPosition(model, data)
     for group in muscle_groups(model):
-        outs = model.actuator_outadr[group.actuators]
-        given = {
-            "u": _excitations(model, data, group.actuators.tolist()),
-            "length": (data.actuator_length[outs] - model.actuator_length0[outs]).tolist(),
-        }
         steady = group.model.steady
-        wanted = [
-            given[name] if name in given else group.columns[name].tolist()
-            for name in arguments(steady)
-        ]
-        states = np.array([steady(*row) for row in zip(*wanted, strict=True)])
+        u = _excitations(model, data, group.actuators.tolist())
+        rows = group.rows(steady, u=u, length=_lengths(model, data, group))
+        states = np.array([steady(*row) for row in rows])
         first = model.actuator_actadr[group.actuators]
         data.act[first[:, None] + np.arange(states.shape[1])] = states
+
+
+def _lengths(model: mujoco.MjModel, data: mujoco.MjData, group: Group) -> list[float]:
+    outs = model.actuator_outadr[group.actuators]
+    lengths: list[float] = (data.actuator_length[outs] - model.actuator_length0[outs]).tolist()
+    return lengths
 
 
 def _excitations(model: mujoco.MjModel, data: mujoco.MjData, actuators: list[int]) -> list[float]:
@@ -115,32 +114,43 @@ def check_states(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 def _check_muscles(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    remedy = "call mjhill.equilibrate(model, data)"
-    muscles = read_muscles(model)
-    for name, at in addresses(model):
-        kind = at.model
-        values = data.act[at.act : at.act + model.actuator_actnum[at.actuator]].tolist()
-        states = dict(zip(kind.state_names, values, strict=False))
+    for group in muscle_groups(model):
+        kind, first = group.model, model.actuator_actadr[group.actuators]
+        named = {name: data.act[first + k] for k, name in enumerate(kind.state_names)}
         for state in kind.states:
-            value = states[state.name]
-            if state.share and not -ROUNDING <= value <= 1 + ROUNDING:
-                raise ValueError(
-                    f"muscle {name!r}: its state {state.name} must be in [0, 1], got {value:g}; "
-                    f"{remedy}"
-                )
-        length = float(data.actuator_length[at.out] - model.actuator_length0[at.out])
-        wrong = kind.fault(muscles[name], states, length)
-        bad = [k for k, value in enumerate(values) if not math.isfinite(value)]
-        if wrong is None and bad:
-            wrong = f"its state number {bad[0]} must be finite, got {values[bad[0]]}"
-        if wrong is not None:
-            raise ValueError(f"muscle {name!r}: {wrong}; {remedy}")
+            if state.share:
+                _check_share(model, group, state.name, named[state.name])
+        counts = model.actuator_actnum[group.actuators]
+        states = [data.act[at : at + n] for at, n in zip(first, counts, strict=True)]
+        rows = group.rows(
+            kind.fault,
+            **{name: values.tolist() for name, values in named.items()},
+            states=states,
+            length=_lengths(model, data, group),
+        )
+        for k, row in enumerate(rows):
+            _refuse(model, group, k, kind.fault(*row))
+        finite = [bool(np.isfinite(values).all()) for values in states]
+        if not all(finite):
+            _refuse(model, group, finite.index(False), "a state of it is not finite")
+
+
+def _check_share(model: mujoco.MjModel, group: Group, name: str, values: np.ndarray) -> None:
+    inside = (values >= -ROUNDING) & (values <= 1 + ROUNDING)  # not so for NaN
+    for k in np.flatnonzero(~inside).tolist():
+        _refuse(model, group, k, f"its state {name} must be in [0, 1], got {values[k]:g}")
+
+
+def _refuse(model: mujoco.MjModel, group: Group, k: int, wrong: str | None) -> None:
+    if wrong is not None:
+        name = actuator_names(model)[int(group.actuators[k])]
+        raise ValueError(f"muscle {name!r}: {wrong}; call mjhill.equilibrate(model, data)")
 
 
 def _check_torn(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Refuse muscles that are lengthened so fast that they would tear."""
     groups = muscle_groups(model)
-    ids = sorted(actuator for group in groups for actuator in group.actuators.tolist())
+    ids = ids_of(groups)
     held, more = in_order(groups, "lengthening")
     (force,) = in_order(groups, "max_isometric_force")
     rate = data.actuator_velocity[model.actuator_outadr[ids]]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mjhill.joints.joint import Passive
 from mjhill.muscles import BY_TAG, MODELS, TAGS, Muscle, MuscleModel, model_of
+from mjhill.muscles.model import arguments
 
 PASSIVE_TAG = 198702.0  # jnt_user[0] of a joint with exponential passive elasticity
 # joints with one coordinate, which can have passive elasticity
@@ -54,7 +55,7 @@ class Address:
 
 @dataclass(frozen=True)
 class Group:
-    """All muscles of one model.
+    """All muscles of one muscle model.
 
     Attributes:
         model: The muscle model.
@@ -66,6 +67,19 @@ class Group:
     actuators: NDArray[np.int_]
     columns: Mapping[str, NDArray[np.float64]]
 
+    def rows(self, equation: Any, **context: Any) -> Iterator[tuple[Any, ...]]:
+        """What an equation asks for, muscle by muscle, in the order of its arguments.
+
+        Args:
+            equation: The equation.
+            context: What is no parameter, by name: a value for each muscle.
+        """
+        wanted = (
+            context[name] if name in context else self.columns[name].tolist()
+            for name in arguments(equation)
+        )
+        return zip(*wanted, strict=True)
+
     def ask(self, equation: Any) -> Any:
         """The value of an equation of parameters alone, for all muscles at once."""
         return self.model.ask_columns(equation, self.columns)
@@ -74,8 +88,7 @@ class Group:
 def has_tag(model: mujoco.MjModel) -> NDArray[np.bool_]:
     """Which actuators have a tag of mjhill, be it known or not."""
     tags = model.actuator_dynprm[:, 0]
-    user = model.actuator_dyntype == _USER
-    return np.asarray(np.isin(tags, list(BY_TAG)) | (user & (tags >= TAGS[0]) & (tags < TAGS[1])))
+    return np.asarray((tags >= TAGS[0]) & (tags < TAGS[1]))
 
 
 def is_muscle(model: mujoco.MjModel, actuator: int) -> bool:
@@ -128,8 +141,12 @@ def _columns(
 
 def muscle_ids(model: mujoco.MjModel) -> list[int]:
     """Actuator ids of the muscles of a model."""
-    ids = [actuator for group in muscle_groups(model) for actuator in group.actuators.tolist()]
-    return sorted(ids)
+    return ids_of(muscle_groups(model))
+
+
+def ids_of(groups: list[Group]) -> list[int]:
+    """Actuator ids of the muscles of some groups, ascending."""
+    return sorted(actuator for group in groups for actuator in group.actuators.tolist())
 
 
 def in_order(groups: list[Group], equation: str) -> tuple[NDArray[np.float64], ...]:
@@ -188,27 +205,28 @@ def address(model: mujoco.MjModel, name: str) -> Address:
     Raises:
         ValueError: No muscle has this name; the message lists those there are.
     """
-    found = dict(addresses(model))
-    if name not in found:
-        known = ", ".join(found) or "none"
-        raise ValueError(f"unknown muscle {name!r}; the model's muscles are: {known}")
-    return found[name]
+    for actuator, known in enumerate(actuator_names(model)):
+        if known == name and is_muscle(model, actuator):
+            return _address(model, actuator)
+    listed = ", ".join(muscle_names(model)) or "none"
+    raise ValueError(f"unknown muscle {name!r}; the model's muscles are: {listed}")
 
 
 def addresses(model: mujoco.MjModel) -> Iterator[tuple[str, Address]]:
     """Name and addresses of each muscle of a model, in the order of its actuators."""
     names = actuator_names(model)
     for actuator in muscle_ids(model):
-        yield (
-            names[actuator],
-            Address(
-                actuator,
-                int(model.actuator_ctrladr[actuator]),
-                int(model.actuator_actadr[actuator]),
-                int(model.actuator_outadr[actuator]),
-                BY_TAG[float(model.actuator_dynprm[actuator, 0])],
-            ),
-        )
+        yield names[actuator], _address(model, actuator)
+
+
+def _address(model: mujoco.MjModel, actuator: int) -> Address:
+    return Address(
+        actuator,
+        int(model.actuator_ctrladr[actuator]),
+        int(model.actuator_actadr[actuator]),
+        int(model.actuator_outadr[actuator]),
+        BY_TAG[float(model.actuator_dynprm[actuator, 0])],
+    )
 
 
 def moments(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:

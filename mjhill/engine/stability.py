@@ -14,6 +14,7 @@ from mjhill.engine.layout import (
     NUSER_JNT,
     SCALAR_JOINTS,
     has_passive,
+    ids_of,
     in_order,
     moments,
     muscle_groups,
@@ -121,7 +122,7 @@ class Plant:
         groups = muscle_groups(model)
         if not groups or not model.nv:
             return None
-        muscles = sorted(i for group in groups for i in group.actuators.tolist())
+        muscles = ids_of(groups)
         data = mujoco.MjData(model)
         mujoco.mj_fwdPosition(model, data)
         free = _free(model, data)

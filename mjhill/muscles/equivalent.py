@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.elements import active_length_factor, series_stretch_at
+from mjhill.elements import active_length_factor, hill_relation, series_stretch_at
 from mjhill.muscles.hill import Hill
 
 _Array = NDArray[np.float64]
@@ -149,9 +149,8 @@ def torque_at_velocity(muscles: Sequence[Hill], velocities: _Array) -> _Array:
     """
     total = np.zeros_like(velocities)
     for muscle in muscles:
-        v = np.minimum(velocities / muscle.max_velocity, 1.0)
-        hill = muscle.hill_shape
-        total += muscle.max_isometric_force * hill * (1 - v) / (hill + v)  # eq. 3
+        v: Any = np.minimum(velocities / muscle.max_velocity, 1.0)
+        total += muscle.max_isometric_force * hill_relation(v, muscle.hill_shape)
     return total
 
 
@@ -192,8 +191,8 @@ def _fit_velocities(muscles: Sequence[Hill]) -> tuple[float, float]:
     torque = torque_at_velocity(muscles, velocities)
 
     def hill(velocity: _Array, v_max: float, a: float) -> _Array:
-        v = np.minimum(velocity / v_max, 1.0)
-        return a * (1 - v) / (a + v)
+        v: Any = np.minimum(velocity / v_max, 1.0)
+        return np.asarray(hill_relation(v, a))
 
     start = (fastest, float(np.mean([muscle.hill_shape for muscle in muscles])))
     slowest = min(muscle.max_velocity for muscle in muscles)

@@ -303,19 +303,25 @@ def compliance(series_stretch: float) -> float:
     return series_stretch
 
 
-def fault(muscle: Hill, states: Mapping[str, float], length: float) -> str | None:
+def fault(
+    s: float,
+    length: float,
+    series_stretch: float,
+    series_shape: float,
+    series_limit: float,
+    width_short: float,
+    width_long: float,
+) -> str | None:
     """What is impossible about a contractile length: it slackens or tears the series element."""
-    stretched = length - states["s"]
-    slackest = 10 * (muscle.series_stretch + muscle.width_short + muscle.width_long)
-    share, _ = series_force(
-        stretched, muscle.series_stretch, muscle.series_shape, muscle.series_limit
-    )
+    stretched = length - s
+    slackest = 10 * (series_stretch + width_short + width_long)
+    share, _ = series_force(stretched, series_stretch, series_shape, series_limit)
     if stretched >= -slackest and share <= STRONGEST:
         return None
     return (
-        f"its contractile length s = {states['s']:g} would stretch the series element by "
-        f"{stretched:g}, to {share:.3g} F_max; allowed are {STRONGEST:g} F_max at most, and a "
-        f"stretch of {-slackest:.3g} at least"
+        f"its contractile length s = {s:g} would stretch the series element by {stretched:g}, to "
+        f"{share:.3g} F_max; allowed are {STRONGEST:g} F_max at most, and a stretch of "
+        f"{-slackest:.3g} at least"
     )
 
 

@@ -172,7 +172,7 @@ def no_time_constants() -> dict[str, Values]:
     return {}
 
 
-def no_fault(_muscle: Any, _states: Mapping[str, float], _length: float) -> str | None:
+def no_fault(max_isometric_force: float) -> str | None:
     """No state of the muscle is impossible but for the bounds of its shares."""
     return None
 
@@ -210,7 +210,7 @@ class MuscleModel:
         from_hill: A muscle of this model that does as a given ``Hill`` muscle, isometrically.
         time_constants: Time constants [s] of its states by name of the parameter; RK4 cannot follow
             one that is shorter than the timestep.
-        fault: What is impossible about a state, in words, or None; see ``no_fault``.
+        fault: What is impossible about states and ``length``, in words, or None.
         viscous_loss: Energy lost inside [J], from what ``series`` gave; see ``nothing_lost``.
         sources: Where its equations come from.
     """
@@ -236,7 +236,7 @@ class MuscleModel:
     activation: str = "a"
     bins: str = ""
     time_constants: Equation = no_time_constants
-    fault: Callable[..., str | None] = no_fault
+    fault: Equation = no_fault
     viscous_loss: Callable[..., Values] = nothing_lost
 
     def __post_init__(self) -> None:
@@ -246,7 +246,7 @@ class MuscleModel:
             TypeError: An equation names something unknown, or a parameter before a state.
         """
         for name in ("rates", "force", "derivatives", "tension", "steady", "at_full_force",
-                     "lengthening", "compliance", "time_constants"):  # fmt: skip
+                     "lengthening", "compliance", "time_constants", "fault"):  # fmt: skip
             self._check_arguments(name, getattr(self, name))
         self.slots  # noqa: B018 (raises where there are too many)
 
