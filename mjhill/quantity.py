@@ -115,6 +115,6 @@ def sources() -> Any:
 
 
 def freeze(parameters: Any, *names: str) -> None:
-    """Keep a copy of mappings that nobody can change, so that equal objects stay equal."""
+    """Replace mappings by copies that cannot be changed, so that equal objects stay equal."""
     for name in names:
         object.__setattr__(parameters, name, FrozenDict(getattr(parameters, name)))

@@ -16,6 +16,8 @@ import mujoco
 from mujoco import _callbacks, _functions
 
 NAMES = ("act_dyn", "act_bias", "passive")
+# symbols that machine code is linked to: three pointers, in the order of NAMES; MuJoCo's function
+CHAIN_SYMBOL, READ_CONTROL = "mjhill_chained_callbacks", "mj_readCtrl"
 ACTUATOR = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
 GENERIC = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 TYPES: dict[str, Any] = {"act_dyn": ACTUATOR, "act_bias": ACTUATOR, "passive": GENERIC}
@@ -44,10 +46,10 @@ class Process:
     """What mjhill has put into the callbacks of this process.
 
     Attributes:
-        lock: Held by whoever changes callbacks.
+        lock: Held while callbacks are changed.
         installations: Those of ``mjhill.install``, the last one on top.
         automatic: Pointers that ``mjhill.engine.autoload`` has put there, by callback.
-        served: What stood there before those.
+        served: The callbacks before those.
         linked: Machine code of ``mjhill.install``. Like all of this it is never freed, because
             MuJoCo may point to it as long as the process lives.
         kept: Stubs and machine code of ``mjhill.engine.autoload``.
@@ -66,7 +68,7 @@ def _process() -> Process:
     held: Any = vars(_callbacks)
     if "_mjhill" not in held:
         process = held.setdefault("_mjhill", Process())
-        # a child of fork has only the forking thread, so no other may hold the lock meanwhile
+        # a child of fork has only the forking thread, so no other may hold the lock during it
         os.register_at_fork(
             before=process.lock.acquire,
             after_in_parent=process.lock.release,

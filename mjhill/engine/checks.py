@@ -1,4 +1,4 @@
-"""Models checked before they run: nothing can be raised from inside a compiled callback."""
+"""Checks of a model before it runs: a compiled callback cannot raise an error."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Finding:
 
     Attributes:
         subject: What it is about: a joint or a muscle, and its name.
-        problem: What is wrong with it, and what comes of that.
+        problem: What is wrong with it, and the effect.
         remedy: What to do.
         severe: Whether results are meaningless, not only off by more than 5 %.
         timestep: The timestep [s] that would do, where it is too long.
@@ -292,7 +292,7 @@ def _pushing(model: mujoco.MjModel, muscles: list[int], names: list[str]) -> Ite
 def _clipped(
     model: mujoco.MjModel, groups: list[Group], muscles: list[int], names: list[str]
 ) -> Iterator[Finding]:
-    """Findings on forces that MuJoCo cuts off, of which the muscle's states know nothing."""
+    """Findings on muscles whose force MuJoCo limits; the muscle's states do not follow that."""
     outs = model.actuator_outadr[muscles]
     limited = model.actuator_forcelimited[outs].astype(bool)
     if not limited.any():

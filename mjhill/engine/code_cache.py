@@ -1,7 +1,7 @@
-"""Where machine code is kept between processes, and what of it is trusted.
+"""Where machine code is kept between processes, and which files are trusted.
 
-What is found here is run, so only a file that nobody else can have written is: a plain file of
-this user, with its digest in front, in a folder that others cannot write.
+What is found here is run, so only files that no other user can have written are trusted: plain
+files of this user, with their digest in front, in a folder that others cannot write.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _DIGEST = hashlib.sha256().digest_size
 
 
 class UntrustedError(Exception):
-    """Something in the cache that is not to be run; the message says what and why."""
+    """Something in the cache that must not be run; the message says what and why."""
 
 
 def cache_folder() -> Path:
@@ -65,14 +65,14 @@ def _check_folder(folder: Path) -> None:
         state = place.stat()
         if state.st_uid not in (os.geteuid(), 0):
             raise UntrustedError(f"the folder {place} belongs to another user")
-        # in a sticky folder such as /tmp others cannot replace what is ours
+        # in a sticky folder such as /tmp others cannot replace our files
         others = _OTHERS if place == real else stat.S_IWOTH
         if state.st_mode & others and not (place != real and state.st_mode & stat.S_ISVTX):
             raise UntrustedError(f"other users can write in the folder {place}; chmod go-w {place}")
 
 
 def read(path: Path, names: tuple[str, ...]) -> Code | None:
-    """Code from the cache; None if it is not there, or not to be trusted, with a warning."""
+    """Code from the cache; None if there is none, or with a warning if it cannot be trusted."""
     try:
         content = _trusted(path)
         with np.load(io.BytesIO(content), allow_pickle=False) as archive:
@@ -127,7 +127,7 @@ def write(path: Path, code: Code) -> None:
 
 @contextlib.contextmanager
 def alone(path: Path) -> Iterator[None]:
-    """One process at a time makes ``path``; the others wait, but not for ever."""
+    """One process at a time makes ``path``; the others wait, up to a limit."""
     lock = path.with_name(f"{path.name}.lock")
     try:
         flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC

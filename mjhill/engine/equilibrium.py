@@ -94,7 +94,7 @@ def check_finite(data: mujoco.MjData) -> None:
 
 
 def check_states(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Refuse data that no muscle and no elasticity could be in, or that no step could leave well.
+    """Refuse data with an impossible state, or one that the timestep cannot follow.
 
     Raises:
         ValueError: A state is outside its bounds, as n and a outside [0, 1]; a state is not a
@@ -196,6 +196,6 @@ def _check_elasticities(model: mujoco.MjModel, data: mujoco.MjData, elastic: lis
         if max(stiffness, reach) > 0.5:
             raise ValueError(
                 f"joint {names[joint]!r}: at {deviation:.3g} from rest its passive elasticity "
-                f"pushes with {torque:.3g}, and a timestep of {timestep:g} s cannot follow what "
-                "comes of that; start nearer to rest, or set a shorter model.opt.timestep"
+                f"pushes with {torque:.3g}, and a timestep of {timestep:g} s is too long "
+                "for that; start nearer to rest, or set a shorter model.opt.timestep"
             )

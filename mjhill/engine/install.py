@@ -1,4 +1,4 @@
-"""Callbacks put into MuJoCo, and everything put back as it was.
+"""Put callbacks into MuJoCo, and restore everything.
 
 MuJoCo's callbacks are process-wide. Ours are pure functions of model and data, so one
 installation serves every model and thread; actuators that are not ours, and passive forces, are
@@ -48,7 +48,7 @@ def install(backend: Backend = "compiled") -> None:
 
     Load models first: with ``backend="python"``, MuJoCo cannot compile a model that has user
     actuators while a Python callback is installed (google-deepmind/mujoco issue 1014);
-    ``mjhill.load`` takes care of that by itself.
+    ``mjhill.load`` works at any time.
 
     Args:
         backend: ``"compiled"`` (machine code, any number of threads) or ``"python"`` (plain
@@ -56,8 +56,8 @@ def install(backend: Backend = "compiled") -> None:
 
     Raises:
         ValueError: There is no such back-end.
-        RuntimeError: Another callback was put over an installation of ours, or MuJoCo's
-            structs are not laid out as its headers say.
+        RuntimeError: Another callback has replaced one that mjhill installed, or MuJoCo's
+            structs differ from its own declarations.
     """
     _install(backend)
 
@@ -70,7 +70,7 @@ def _install(backend: Backend) -> _Installation:
         if _stack:
             _check_still_ours(_stack[-1])
         before = {name: read(name) for name in NAMES}
-        # what serves others is what stood there before our first installation
+        # other actuators are served by the callbacks from before our first installation
         served = _stack[0].served if _stack else _others(before)
         try:
             (_put_compiled if backend == "compiled" else _put_python)(served)
@@ -150,7 +150,7 @@ def installed_backend() -> Backend | None:
 
 @contextmanager
 def without_python_callbacks() -> Iterator[None]:
-    """Take Python callbacks out while a model is compiled, which they would make fail."""
+    """Take Python callbacks out while a model is compiled: with them that fails."""
     with _lock:
         present = {name: read(name) for name in NAMES}
         held = {name: slot for name, slot in present.items() if slot.is_python}
@@ -164,7 +164,7 @@ def without_python_callbacks() -> Iterator[None]:
 
 
 def _others(before: dict[str, Slot]) -> dict[str, Slot]:
-    """What callbacks held, with what they held before ours for those put there by autoload."""
+    """What callbacks held; for those of autoload, what they held before."""
     ours = PROCESS.automatic
     return {
         name: PROCESS.served[name] if slot.pointer in ours.get(name, ()) else slot
@@ -229,7 +229,7 @@ def _callable(name: str, slot: Slot) -> Callable[..., Any] | None:
 
 
 def _put_back(slots: dict[str, Slot]) -> None:
-    """What callbacks held before; a Python function that a thread may be about to call stays."""
+    """Restore callbacks; keep a Python function that another thread may be about to call."""
     for name, slot in slots.items():
         if _of_other_threads() and not slot.is_python and read(name).is_python:
             global_pointer(name).value = slot.pointer

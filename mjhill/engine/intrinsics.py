@@ -9,7 +9,7 @@ from llvmlite import ir
 from numba import extending, types
 from numba.core import cgutils
 
-from mjhill.engine.machine_code import CHAIN_SYMBOL, READ_CONTROL
+from mjhill.engine.callbacks import CHAIN_SYMBOL, READ_CONTROL
 from mjhill.muscles import MuscleModel
 from mjhill.muscles.model import ARRAYS, CONTEXT, FIRST_SLOT
 
@@ -148,7 +148,7 @@ chained_act_bias = _chained_actuator(1)
 
 @intrinsic
 def chained_passive(typingctx: Any, model: Any, data: Any) -> Any:
-    """Call the passive callback that was installed before ours, if there was one."""
+    """Call the passive callback that was installed before mjhill's, if there was one."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         pointer = _chained(builder, 2)

@@ -86,7 +86,7 @@ class Group:
 
 
 def has_tag(model: mujoco.MjModel) -> NDArray[np.bool_]:
-    """Which actuators have a tag of mjhill, be it known or not."""
+    """Which actuators have a tag of mjhill, known or unknown."""
     tags = model.actuator_dynprm[:, 0]
     return np.asarray((tags >= TAGS[0]) & (tags < TAGS[1]))
 
@@ -325,7 +325,7 @@ def read_passive(model: mujoco.MjModel, name: str) -> Passive:
     """The exponential passive elasticity of a joint, from the model's arrays.
 
     Raises:
-        ValueError: No joint has this name, it has no passive elasticity of ours, or a value is
+        ValueError: No joint has this name, it has no passive elasticity of mjhill, or a value is
             outside its bounds.
     """
     joint = joint_id(model, name)
@@ -345,7 +345,7 @@ def write_passive(model: mujoco.MjModel, name: str, passive: Passive) -> None:
     """Write the exponential passive elasticity of a joint into the model's arrays.
 
     Raises:
-        ValueError: No joint has this name, or it has no passive elasticity of ours.
+        ValueError: No joint has this name, or it has no passive elasticity of mjhill.
     """
     read_passive(model, name)
     model.jnt_user[joint_id(model, name), :NUSER_JNT] = passive_row(passive)

@@ -16,12 +16,10 @@ from typing import Any
 import llvmlite.binding as llvm
 
 from mjhill.engine import code_cache
-from mjhill.engine.callbacks import mujoco_library
+from mjhill.engine.callbacks import CHAIN_SYMBOL, READ_CONTROL, mujoco_library
 from mjhill.engine.equations import source_digest
 from mjhill.engine.structs import verify_fields
 
-CHAIN_SYMBOL = "mjhill_chained_callbacks"  # three pointers: act_dyn, act_bias, passive
-READ_CONTROL = "mj_readCtrl"
 _UNUSED = (ctypes.c_void_p * 3)()
 _NAMES = ("act_dyn", "act_bias", "passive")
 

@@ -47,7 +47,7 @@ class Mode:
 
 @dataclass(frozen=True)
 class Swing:
-    """A movement that goes on by itself, because muscles and joints take little of its energy.
+    """A movement with little damping: muscles and joints take little of its energy.
 
     Attributes:
         period: [s].

@@ -101,10 +101,10 @@ def _joint(name: str, table: Any) -> Joint:
     if not muscles:
         raise ValueError(f"{name}.muscles: there must be at least one muscle; add one")
     postures = _split(values.pop("postures", {}), f"{name}.postures")
-    told = {f"postures.{muscle}": source for muscle, source in postures.pop("sources").items()}
+    stated = {f"postures.{muscle}": source for muscle, source in postures.pop("sources").items()}
     values |= {
         "name": name,
-        "sources": MappingProxyType({**values["sources"], **told}),
+        "sources": MappingProxyType({**values["sources"], **stated}),
         "passive": _made(
             Passive,
             _split(_subtable(values, "passive", name), f"{name}.passive"),

@@ -1,8 +1,8 @@
 """The seam: what a muscle model says about itself, and how everything else asks it.
 
 A model is one file with a ``MuscleModel`` at its end and one line in ``mjhill.muscles``. Its
-equations are pure functions of floats. Each names what it needs as its arguments, and whoever
-calls it gives it that: the state of the muscle first (see ``CONTEXT``), then parameters by the
+equations are pure functions of floats. Each names what it needs as its arguments, and the
+caller gives it that: the state of the muscle first (see ``CONTEXT``), then parameters by the
 names that they have in the parameter class. So the order of the arguments stands in one place,
 the function itself; back-ends build their calls from it.
 
@@ -179,7 +179,7 @@ def no_fault(max_isometric_force: float) -> str | None:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MuscleModel:
-    """What there is to know of a muscle model.
+    """Everything that the rest of mjhill asks of a muscle model.
 
     Equations are functions whose arguments name what they need; ``rates`` and ``force`` are
     compiled, so they and what they call use only floats, ``exp``, ``log`` and ``sqrt``.
@@ -240,7 +240,7 @@ class MuscleModel:
     viscous_loss: Callable[..., Values] = nothing_lost
 
     def __post_init__(self) -> None:
-        """Check that every equation asks for what there is.
+        """Check that every equation asks only for what exists.
 
         Raises:
             TypeError: An equation names something unknown, or a parameter before a state.

@@ -168,7 +168,7 @@ def linear_change(
 ) -> tuple[float, float, float, float]:
     """Change of a stretch >= 0 in dt [s] by the equation made linear, and how far that is off.
 
-    The hypothetical force rises by ``gain`` meanwhile.
+    The hypothetical force rises by ``gain`` in that time.
 
     Returns:
         the change; q times the rate [length/s] that the linear equation has at its end; q; q

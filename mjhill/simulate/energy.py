@@ -1,4 +1,4 @@
-"""The energy balance of a recording: what muscles give, and where it goes."""
+"""The energy balance of a recording: work of the muscles, energy stored and lost."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class Energy:
 
     Attributes:
         time: When [s].
-        contractile: Work of each muscle's contractile element, by muscle.
-        viscosity: Loss in the viscosity beside each contractile element; ``contractile`` is
-            what is left after it.
+        contractile: Work of each muscle's contractile element, by muscle; the loss in its
+            viscosity is already taken off.
+        viscosity: Loss in the viscosity beside each contractile element.
         series: Energy gained by each series element.
-        withheld: Work of each series element that MuJoCo does not pass on, because of a
+        withheld: Work of each series element that MuJoCo does not apply, because of a
             ``forcerange`` or a disabled group; otherwise 0.
         delivered: Work of each muscle on the skeleton.
         kinetic: Energy of motion gained.
@@ -129,7 +129,7 @@ def energy(recording: Recording) -> Energy:
     """The energy balance of a recording of every step.
 
     Args:
-        recording: What ``record`` returned, or such a one loaded from a file.
+        recording: What ``record`` returned, or the same loaded from a file.
 
     Raises:
         ValueError: The recording does not have every step, or not the series that it takes.

@@ -28,7 +28,7 @@ class Recording:
         series: Name to values, each of shape (T,).
         units: Name to unit, for each name in ``series``.
         about: What was run: model, integrator, timestep, versions; strings and numbers.
-        muscles: Parameters of the muscles of ours, by name.
+        muscles: Parameters of the mjhill muscles, by name.
     """
 
     time: NDArray[np.float64]

@@ -42,39 +42,40 @@ def record(
     Over each step, an input is held at its value of mid-step. ``docs/energy.md`` has a table of
     all series with units and equations. Series of joints are ``<joint>.angle``,
     ``<joint>.velocity`` (``position`` for a slide, ``qpos0``... for others), ``<joint>.applied``
-    where a torque is given, and ``<joint>.passive_energy`` where the joint is elastic. For each
-    muscle, what it does is ``u``, ``n``, ``a``, ``velocity`` (of the contractile element,
-    shortening positive), ``stretch`` (of the series element) and ``force`` (tension positive, as
-    MuJoCo applies it). What follows from that is ``length``, ``contractile_length``,
+    where a torque is given, and ``<joint>.passive_energy`` where the joint is elastic. Each muscle
+    has ``u`` (excitation), what its muscle model shows, and a moment arm ``arm_<joint>`` for each
+    joint that it moves. ``mjhill.Hill`` shows ``n``, ``a``, ``velocity`` (of the contractile
+    element, shortening positive), ``stretch`` (of the series element), ``force`` (tension
+    positive, as MuJoCo applies it), ``length``, ``length_rate``, ``contractile_length``,
     ``series_stiffness``, ``series_energy``, ``contractile_power``, ``series_power``, ``power``,
-    ``contractile_work``, ``work`` and a moment arm ``arm_<joint>`` for each joint that it moves.
-    Where MuJoCo applies another force than the series element carries, as with a ``forcerange``
-    or a disabled group, ``tension`` is the latter. A native MuJoCo muscle has ``u``, ``a``,
-    ``force``, any other actuator ``u`` and ``force`` as MuJoCo has them. Energies and works of
-    the whole model are ``model.kinetic_energy`` and so on; ``mjhill.energy`` puts them together.
+    ``contractile_work`` and ``work``. Where MuJoCo applies another force than the series element
+    carries, as with a ``forcerange`` or a disabled group, ``tension`` is that of the element. A
+    native MuJoCo muscle has ``u``, ``a``, ``force``, any other actuator ``u`` and ``force`` as
+    MuJoCo has them. Energies and works of the whole model are ``model.kinetic_energy`` and so on;
+    ``mjhill.energy`` puts them together.
 
-    A muscle's ``velocity`` is the mean over the interval from the sample before: how much the
-    contractile element has shortened since, by the time between. So it adds up to the way the
-    element has really come. That of the first sample is the scheme's: the mean over the step
-    before it, or under RK4 the rate at that moment. Powers are means in the same way.
+    A muscle's ``velocity`` is the mean over the interval since the sample before: the shortening
+    of the contractile element, divided by the time. So its integral is the true shortening. At the
+    first sample it is the mean over the step before, or under RK4 the present rate. Powers are
+    means in the same way.
 
     Args:
         model: The model.
         data: Its state, advanced in place by ``duration``.
         duration: Length of the run [s].
-        excitation: Neural input by actuator name; controls not named stay as they are.
+        excitation: Excitation by muscle name, or control by actuator name; others stay as they are.
         torque: External torque [N·m] or force [N] by joint name.
         every: Record every that many steps.
-        progress: Called now and then with the share done, 0 to 1.
+        progress: Called from time to time with the share done, 0 to 1.
 
     Raises:
         ValueError: A name is unknown or would be that of two series, an input is not finite, a
             number is out of range, or the model is not in order; see ``check_model``.
         RuntimeError: Callbacks are not installed though the model has muscles, or MuJoCo
-            warned: it resets a state that went bad and goes on, so what follows is no run.
+            warned: it resets a bad state and goes on, so the rest would be meaningless.
 
     Warns:
-        RuntimeWarning: A muscle did what no muscle can; see ``transients``.
+        RuntimeWarning: A muscle did something impossible; see ``transients``.
     """
     check_model(model)
     steps = _number_of_steps(duration, float(model.opt.timestep))
@@ -137,8 +138,8 @@ def _number_of_steps(duration: float, timestep: float) -> int:
 def _require_callbacks(model: mujoco.MjModel) -> None:
     if muscle_ids(model) and installed_backend() is None:
         raise RuntimeError(
-            "the model has mjhill muscles but no callbacks are installed, so they would stay "
-            "limp; run inside `with mjhill.installed():`"
+            "the model has mjhill muscles but no callbacks are installed, so they would have "
+            "no force; run inside `with mjhill.installed():`"
         )
 
 
@@ -168,7 +169,7 @@ def _scalar_joints(model: mujoco.MjModel) -> list[str]:
 
 
 def check_warnings(data: mujoco.MjData) -> None:
-    """Refuse data in which MuJoCo warned: it resets a state that went bad and goes on.
+    """Refuse data in which MuJoCo warned: it resets a bad state and goes on.
 
     Raises:
         RuntimeError: A warning was counted; the message has its name and the time.

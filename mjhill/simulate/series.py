@@ -129,7 +129,7 @@ def _excitation(model: mujoco.MjModel, samples: Samples, at: Address) -> _Values
 
 
 def _other_series(model: mujoco.MjModel, samples: Samples, actuator: int) -> _Series:
-    """The input and force of an actuator of one control and one output, no muscle of ours."""
+    """Control and force of another actuator, with one control and one output."""
     ctrl, out = int(model.actuator_ctrladr[actuator]), int(model.actuator_outadr[actuator])
     if model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_MUSCLE:
         yield "u", "-", samples.column("ctrl", ctrl)

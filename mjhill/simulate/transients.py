@@ -1,4 +1,4 @@
-"""Moments of a recording in which a muscle does what no muscle can."""
+"""Moments of a recording in which a muscle does something impossible."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _Values = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Transient:
-    """A muscle that did what no muscle can.
+    """A muscle that did something impossible.
 
     Attributes:
         muscle: Its name.
@@ -32,7 +32,7 @@ class Transient:
         unit: That unit.
         samples: Number of samples beyond the limit.
         first: Time of the first of them [s].
-        cause: What most likely made it.
+        cause: The most likely cause.
         remedy: What to do.
     """
 
@@ -65,7 +65,7 @@ class Transient:
 
 
 def transients(recording: Recording) -> tuple[Transient, ...]:
-    """Moments in which muscles of ours did what no muscle can, at most one of each kind for each.
+    """Moments in which mjhill muscles did something impossible, at most one of each kind for each.
 
     - *force*: more than the contractile element can hold, F_max times the eccentric plateau and
       what its viscosity adds at the fastest lengthening that the joints have yet made; in no case
@@ -109,7 +109,7 @@ def _of_muscle(recording: Recording, name: str, muscle: Muscle) -> Iterator[Tran
     slow, more = model.ask(model.lengthening, muscle)
     held = _MARGIN * slow + more * lengthened
     carried = np.minimum(held, STRONGEST * muscle.max_isometric_force)
-    checks = {  # values, what they have too much, what is possible
+    checks = {  # values, their excess, the limit
         "force": (tension, tension - carried, carried),
         "velocity": (
             velocity,
