@@ -124,7 +124,7 @@ class Recording:
         """
         from mjhill.simulate.recording_files import load
 
-        return load(Path(path))
+        return load(Path(path), Recording)
 
 
 def shown(name: str) -> str:

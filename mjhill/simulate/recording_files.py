@@ -10,18 +10,17 @@ import re
 import zipfile
 import zlib
 from array import array
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.files import replacing
 from mjhill.muscles import Muscle, model_of, muscle_model
-from mjhill.simulate.recording import Recording
 
 FORMAT = 2  # of both kinds of file; 1 was without the parameters of muscles
 META, TIME, SERIES = "meta.json", "time.npy", "series.npy"  # the members of an NPZ
@@ -36,13 +35,18 @@ _HEADER = re.compile(
 )
 
 _Values = NDArray[np.float64]
+_Made = TypeVar("_Made")
+# time, series, units, what was run, parameters of muscles
+_Parts = tuple[
+    _Values, dict[str, _Values], dict[str, str], dict[str, str | float], dict[str, Muscle]
+]
 
 
 class _DamageError(ValueError):
     """What is wrong with a file, without its name."""
 
 
-def save(recording: Recording, path: Path) -> Path:
+def save(recording: Any, path: Path) -> Path:
     """Write a recording; see ``Recording.save``."""
     writers = {".csv": _write_csv, ".npz": _write_npz}
     if path.suffix not in writers:
@@ -52,15 +56,15 @@ def save(recording: Recording, path: Path) -> Path:
     return path
 
 
-def load(path: Path) -> Recording:
-    """Read a recording; see ``Recording.load``."""
+def load(path: Path, make: Callable[..., _Made]) -> _Made:
+    """Read a recording, made by ``make`` from its parts; see ``Recording.load``."""
     readers = {".csv": _read_csv, ".npz": _read_npz}
     if path.suffix not in readers:
         raise ValueError(f"recording {str(path)!r} must end in .csv or .npz")
     if path.exists() and not path.is_file():
         raise ValueError(f"{path}: not a mjhill recording: it is not a regular file")
     with _naming(path):
-        return readers[path.suffix](path)
+        return make(*readers[path.suffix](path))
 
 
 @contextmanager
@@ -82,11 +86,11 @@ def _naming(path: Path) -> Iterator[None]:
         raise ValueError(f"{path}: damaged recording: it points outside itself") from error
 
 
-def _write_csv(recording: Recording, path: Path) -> None:
+def _write_csv(recording: Any, path: Path) -> None:
     columns = [recording.time, *recording.series.values()]
     header = ["time [s]"] + [f"{name} [{recording.units[name]}]" for name in recording.series]
     with path.open("w", newline="", encoding="utf-8") as file:
-        file.write(f"# {json.dumps({'format': FORMAT, **_told(recording)})}\n")
+        file.write(f"# {json.dumps({'format': FORMAT, **_described(recording)})}\n")
         writer = csv.writer(file)
         writer.writerow(header)
         writer.writerows(zip(*map(_decimals, columns), strict=True))
@@ -102,7 +106,7 @@ def _decimals(column: _Values) -> Iterable[str]:
     return ["-nan" if bad else text for text, bad in zip(numbers, odd.tolist(), strict=True)]
 
 
-def _read_csv(path: Path) -> Recording:
+def _read_csv(path: Path) -> _Parts:
     with path.open(newline="", encoding="utf-8") as file:
         first = file.readline(MOST_META)
         rows = csv.reader(file, strict=True)
@@ -124,7 +128,7 @@ def _read_csv(path: Path) -> Recording:
             cells.extend(_numbers(row, header, line))
     table = np.frombuffer(cells, dtype=np.float64) if cells else np.empty(0)
     columns = table.reshape(-1, len(header)).T.copy()
-    return Recording(columns[0], dict(zip(names, columns[1:], strict=True)), units, about, muscles)
+    return (columns[0], dict(zip(names, columns[1:], strict=True)), units, about, muscles)
 
 
 def _titles(titles: list[str]) -> tuple[list[str], dict[str, str]]:
@@ -162,12 +166,12 @@ def _numbers(row: list[str], header: list[str], line: int) -> list[float]:
         raise
 
 
-def _write_npz(recording: Recording, path: Path) -> None:
+def _write_npz(recording: Any, path: Path) -> None:
     meta = {
         "format": FORMAT,
         "names": list(recording.series),
         "units": [recording.units[name] for name in recording.series],
-        **_told(recording),
+        **_described(recording),
     }
     shape = len(recording.series), len(recording)
     table = np.array([*recording.series.values()], dtype="<f8").reshape(shape)
@@ -189,7 +193,7 @@ def _allowed(path: Path) -> int:
     return max(SMALL, MOST_EXPANSION * path.stat().st_size)
 
 
-def _read_npz(path: Path) -> Recording:
+def _read_npz(path: Path) -> _Parts:
     with zipfile.ZipFile(path) as archive:
         members = archive.infolist()
         if sorted(member.filename for member in members) != sorted((META, TIME, SERIES)):
@@ -221,7 +225,7 @@ def _read_npz(path: Path) -> Recording:
         raise _DamageError(f"damaged recording: two series have the same name in {META}")
     about, muscles = _understood(meta)
     series = dict(zip(names, table, strict=True))
-    return Recording(time, series, dict(zip(names, units, strict=True)), about, muscles)
+    return (time, series, dict(zip(names, units, strict=True)), about, muscles)
 
 
 def _array(archive: zipfile.ZipFile, name: str, dimensions: int) -> _Values:
@@ -246,7 +250,7 @@ def _array(archive: zipfile.ZipFile, name: str, dimensions: int) -> _Values:
     return values.reshape(shape).astype(np.float64)
 
 
-def _told(recording: Recording) -> dict[str, Any]:
+def _described(recording: Any) -> dict[str, Any]:
     """What a file says beside the series."""
     muscles = {
         name: {"model": model_of(muscle).name, **asdict(muscle)}
