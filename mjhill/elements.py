@@ -15,7 +15,7 @@ from math import exp, log, sqrt
 
 
 def excitation_rate(u: float, n: float, tau: float) -> float:
-    """Rate [1/s] of neural excitation n driven by input u (sect. 3.1, NEX)."""
+    """Rate [1/s] of neural excitation n, driven by the excitation u (sect. 3.1, NEX)."""
     return (u - n) / tau
 
 

@@ -26,7 +26,7 @@ from mjhill.quantity import check_quantities, freeze, quantity, sources
 # what an equation can ask for beside states and parameters:
 CONTEXT = (
     "staged",  # whether the integrator is RK4, whose stages each see a state of their own
-    "u",  # excitation: the muscle's input, clamped to [0, 1]
+    "u",  # excitation: the muscle's control, clamped to [0, 1]
     "length",  # actuator length less that at qpos0 [rad or m]
     "length_rate",  # its rate, MuJoCo's actuator velocity [rad/s or m/s]
     "timestep",  # [s]

@@ -1,1 +1,1 @@
-"""Runs: inputs over time, the recording of what came of them, and the reference solution."""
+"""Runs: inputs over time, recordings, and the reference solution."""

@@ -41,11 +41,11 @@ def simulate(
 ) -> Recording:
     """Solve the equations of a joint and its two muscles, or of any system.
 
-    Restarted wherever an input jumps.
+    The solver restarts where an input jumps.
 
     Args:
         system: The joint or system.
-        excitation: Neural input of each muscle, by name; a muscle not named gets 0.
+        excitation: Excitation of each muscle, by name; a muscle not named gets 0.
         torque: External torque [N·m] or force [N] by coordinate; one value serves a joint.
         movement: Movements of coordinates that are prescribed, by name; the others are free.
         duration: Length of the run [s].
@@ -69,12 +69,12 @@ def simulate(
         if not (np.isfinite(value) and value > 0):
             raise ValueError(f"{what} must be positive, got {value}")
     whole = System.of(system) if isinstance(system, Joint) else system
-    inputs = as_signals(excitation, whole.muscles, "muscle")
-    inputs = {name: inputs.get(name, as_signal(0.0)) for name in whole.muscles}
+    given = as_signals(excitation, whole.muscles, "muscle")
+    excitations = {name: given.get(name, as_signal(0.0)) for name in whole.muscles}
     loads = _loads(whole, torque)
     movements = _known_movements(whole, movement or {})
     times: _Vector = np.arange(round(duration / sample) + 1, dtype=np.float64) * sample
-    breaks = [signal.breaks for signal in (*inputs.values(), *loads.values())]
+    breaks = [signal.breaks for signal in (*excitations.values(), *loads.values())]
     breaks += [moved.breaks for moved in movements.values()]
     knots = _knots(breaks, float(times[-1]))
     state = rest_state(system) if start is None else np.array(start, dtype=np.float64)
@@ -83,7 +83,7 @@ def simulate(
     for begin, end in itertools.pairwise(knots):
         fuzz = 1e-9 * sample
         inside = (times > begin + fuzz) & (times <= end + fuzz)
-        rates = _rates(whole, inputs, loads, movements, begin, end)
+        rates = _rates(whole, excitations, loads, movements, begin, end)
         solution = _solve(rates, begin, end, state, times[inside], rtol, atol, solver)
         states[inside] = solution[:, : inside.sum()].T
         state = solution[:, -1]
@@ -91,7 +91,7 @@ def simulate(
         if name in movements:
             states[:, 2 * index] = [movements[name].position(time) for time in times]
             states[:, 2 * index + 1] = [movements[name].velocity(time) for time in times]
-    return _recorded(whole, inputs, loads, times, states, solver)
+    return _recorded(whole, excitations, loads, times, states, solver)
 
 
 def rest_state(
@@ -105,7 +105,7 @@ def rest_state(
         system: The joint, or the system.
         angle: The position [rad or m], by coordinate or one for all; by default the joint's
             home angle, or the rest position of each coordinate.
-        excitation: Steady input of each muscle; by default 0.
+        excitation: Steady excitation of each muscle; by default 0.
 
     Returns:
         Position and velocity of each coordinate, then the states of each muscle.
@@ -172,7 +172,7 @@ def _known_movements(system: System, movement: Mapping[str, Movement]) -> dict[s
 
 def _rates(
     system: System,
-    inputs: Mapping[str, Signal],
+    excitations: Mapping[str, Signal],
     loads: Mapping[str, Signal],
     movements: Mapping[str, Movement],
     begin: float,
@@ -182,7 +182,7 @@ def _rates(
     order = {name: index for index, name in enumerate(system.coordinates)}
     muscles = [
         (
-            inputs[name],
+            excitations[name],
             _equations(muscle),
             [(order[j], arm) for j, arm in system.arms[name].items()],
         )
@@ -310,7 +310,7 @@ def _solve(
 
 def _recorded(
     system: System,
-    inputs: Mapping[str, Signal],
+    excitations: Mapping[str, Signal],
     loads: Mapping[str, Signal],
     times: _Vector,
     states: _Vector,
@@ -331,7 +331,7 @@ def _recorded(
         arms = system.arms[name].items()
         lengths = np.sum([arm * states[:, order[joint]] for joint, arm in arms], axis=0)
         length_rates = np.sum([arm * states[:, order[joint] + 1] for joint, arm in arms], axis=0)
-        u = np.array([inputs[name](time) for time in times])
+        u = np.array([excitations[name](time) for time in times])
         columns = _muscle_series(muscle, u, states[:, span], lengths, length_rates)
         kinds = units_of(not system.slides(name))
         for quantity, (kind, values) in columns.items():

@@ -1,4 +1,4 @@
-"""Runs from a model's home pose with scripted inputs, and what to say about them."""
+"""Runs from a model's home pose with scripted excitations, and summaries of them."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ LONGEST = 10_000_000  # steps
 LARGEST = 4e9  # memory that a recording may take [byte]
 _BYTES = 56  # of memory for each number, the most being taken while it is written as text
 _SHORT = 10_000  # steps that need no look at the memory
-_ROUNDING = 1e-9  # in a sum of levels
+_ROUNDING = 1e-9  # in a sum of excitations
 
 
 def movement(muscles: list[str]) -> dict[str, Signal]:
-    """Neural inputs of the movement that ``mjhill demo`` shows, 4 s long.
+    """Excitations of the movement that ``mjhill demo`` shows, 4 s long.
 
     A step: the first muscle at 30 % for 0.8 s. A pulse pair: it and its antagonist fire one full
     pulse each, as in a fast voluntary movement. Co-contraction: both at 40 %.
@@ -38,7 +38,7 @@ def movement(muscles: list[str]) -> dict[str, Signal]:
     if len(muscles) != 2:
         raise ValueError(
             "the scripted movement is for a pair of muscles, and the model has "
-            f"{len(muscles)}: {', '.join(muscles) or 'none'}; give the inputs, such as "
+            f"{len(muscles)}: {', '.join(muscles) or 'none'}; give the excitations, such as "
             "--excite NAME=0.5"
         )
     agonist, antagonist = muscles
@@ -55,11 +55,11 @@ def run(
     duration: float,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[mujoco.MjModel, Recording]:
-    """Run a model from its ``home`` key, or its default pose, with muscles steady at no input.
+    """Run a model from its ``home`` key, or its default pose, with muscles steady and relaxed.
 
     Args:
         model: A joint's name or a path.
-        excitation: Neural inputs by muscle; without any, the scripted ``movement``.
+        excitation: Excitations by muscle; without any, the scripted ``movement``.
         torque: External torques by joint.
         duration: Length of the run [s].
         progress: Called now and then with the share done, 0 to 1.
@@ -82,31 +82,31 @@ def run_loaded(
     """``run`` with a model that is loaded already.
 
     Raises:
-        ValueError: As ``record``, or a muscle's input leaves 0 to 1, or the run is too long.
+        ValueError: As ``record``, or an excitation leaves 0 to 1, or the run is too long.
         RuntimeError: As ``record``.
     """
     data = at_home(model)
-    inputs = excitation or (movement(muscle_names(model)) if not torque else {})
-    _check_levels(model, inputs)
+    excitations = excitation or (movement(muscle_names(model)) if not torque else {})
+    _check_excitations(model, excitations)
     with installed():
         _check_length(model, data, duration)
         return record(
-            model, data, duration=duration, excitation=inputs, torque=torque, progress=progress
+            model, data, duration=duration, excitation=excitations, torque=torque, progress=progress
         )
 
 
-def _check_levels(model: mujoco.MjModel, inputs: Mapping[str, Signal | float]) -> None:
-    """Refuse what a muscle would clip; the inputs are constant between their breaks."""
+def _check_excitations(model: mujoco.MjModel, excitations: Mapping[str, Signal | float]) -> None:
+    """Refuse excitations outside 0 to 1; they are constant between their breaks."""
     native = model.actuator_gaintype == mujoco.mjtGain.mjGAIN_MUSCLE
     names = actuator_names(model)
     muscles = {*muscle_names(model), *(names[index] for index in np.flatnonzero(native))}
-    for name in muscles & inputs.keys():
-        signal = as_signal(inputs[name])
+    for name in muscles & excitations.keys():
+        signal = as_signal(excitations[name])
         for time in (0.0, *signal.breaks):
             if not -_ROUNDING <= signal(time) <= 1 + _ROUNDING:
                 raise ValueError(
-                    f"input of muscle {name!r} must be 0 to 1, got {signal(time):g} at {time:g} s; "
-                    "lower the level, or the sum of the levels where there are several"
+                    f"excitation of muscle {name!r} must be 0 to 1, got {signal(time):g} at "
+                    f"{time:g} s; lower it, or the sum of its parts where there are several"
                 )
 
 
