@@ -156,7 +156,7 @@ def _check_torn(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     rate = data.actuator_velocity[model.actuator_outadr[ids]]
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         torn = (held + more * np.maximum(rate, 0.0)) / force
-    for row in np.flatnonzero(~(torn <= STRONGEST)).tolist():
+    for row in np.flatnonzero(~(torn <= STRONGEST * (1 + ROUNDING))).tolist():
         raise ValueError(
             f"muscle {actuator_names(model)[ids[row]]!r}: it is lengthened at {rate[row]:.3g} per "
             f"second and would carry {torn[row]:.3g} F_max, above {STRONGEST:g}; start slower"

@@ -7,7 +7,6 @@ shortens at the velocity that Hill's relation gives it (CE) under the force of t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +15,6 @@ from mjhill.elements import activation_rate, excitation_rate, series_force, seri
 from mjhill.muscles.model import (
     STRONGEST,
     MuscleModel,
-    Reading,
     Series,
     State,
     Track,
@@ -195,6 +193,38 @@ def force(
     return share * max_isometric_force
 
 
+def shortening_velocity(
+    a: float,
+    s: float,
+    length: float,
+    activation_floor: float,
+    optimal_length: float,
+    width_short: float,
+    width_long: float,
+    series_stretch: float,
+    series_shape: float,
+    series_limit: float,
+    max_velocity: float,
+    hill_shape: float,
+    eccentric_plateau: float,
+    eccentric_slope_ratio: float,
+    viscosity: float,
+    velocity_activation: float,
+) -> float:
+    """True velocity of the contractile element [rad/s or m/s], positive when it shortens."""
+    share = active_share(a, length, activation_floor, optimal_length, width_short, width_long)
+    carried, _ = series_force(length - s, series_stretch, series_shape, series_limit)
+    return velocity_at_force(
+        carried, share, max_velocity, hill_shape, eccentric_plateau, eccentric_slope_ratio,
+        viscosity, velocity_activation,
+    )  # fmt: skip
+
+
+def taut_length(s: float, length: float) -> float:
+    """True stretch of the series element [rad or m]; slack below 0."""
+    return length - s
+
+
 def derivatives(
     u: float,
     n: float,
@@ -220,11 +250,10 @@ def derivatives(
     velocity_activation: float,
 ) -> tuple[float, float, float]:
     """True rates of n, a and s [1/s, 1/s, length/s]."""
-    share = active_share(a, length, activation_floor, optimal_length, width_short, width_long)
-    carried, _ = series_force(length - s, series_stretch, series_shape, series_limit)
-    shortening = velocity_at_force(
-        carried, share, max_velocity, hill_shape, eccentric_plateau, eccentric_slope_ratio,
-        viscosity, velocity_activation,
+    shortening = shortening_velocity(
+        a, s, length, activation_floor, optimal_length, width_short, width_long, series_stretch,
+        series_shape, series_limit, max_velocity, hill_shape, eccentric_plateau,
+        eccentric_slope_ratio, viscosity, velocity_activation,
     )  # fmt: skip
     source = u if electrical_stimulation > 0 else n
     return (
@@ -388,23 +417,6 @@ def series_energy(muscle: Hill, stretched: Values) -> Values:
     return np.asarray(scale * (grown - taut))
 
 
-def reading(
-    muscle: Hill, states: Mapping[str, float], length: float, _length_rate: float
-) -> Reading:
-    """Velocity of the contractile element and stretch of the series element at a moment."""
-    stretched = length - states["s"]
-    share, _ = series_force(
-        stretched, muscle.series_stretch, muscle.series_shape, muscle.series_limit
-    )
-    velocity = MODEL.ask(
-        velocity_at_force,
-        muscle,
-        force=share,
-        share=MODEL.ask(active_share, muscle, a=states["a"], length=length),
-    )
-    return {"velocity": ("rate", velocity), "stretch": ("length", stretched)}
-
-
 MODEL = MuscleModel(
     name="hill",
     tag=198701.0,
@@ -417,7 +429,7 @@ MODEL = MuscleModel(
     tension=tension,
     steady=steady,
     series=series,
-    reading=reading,
+    readings={"velocity": ("rate", shortening_velocity), "stretch": ("length", taut_length)},
     at_full_force=at_full_force,
     lengthening=lengthening,
     compliance=compliance,

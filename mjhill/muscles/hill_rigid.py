@@ -6,13 +6,12 @@ This is what MuJoCo's native muscle assumes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from mjhill.elements import activation_rate, excitation_rate
-from mjhill.muscles.model import MuscleModel, Reading, Series, Track, Values, same_parameters
+from mjhill.muscles.model import MuscleModel, Series, Track, Values, same_parameters
 from mjhill.muscles.parts import (
     ACTIVATION,
     EXCITATION,
@@ -137,11 +136,9 @@ def series(track: Track) -> Series:
     yield "work", "energy", work
 
 
-def reading(
-    _muscle: HillRigid, _states: Mapping[str, float], _length: float, length_rate: float
-) -> Reading:
-    """Velocity of the contractile element at a moment."""
-    return {"velocity": ("rate", -length_rate)}
+def shortening_velocity(length_rate: float) -> float:
+    """Velocity of the contractile element [rad/s or m/s], positive when it shortens."""
+    return -length_rate
 
 
 MODEL = MuscleModel(
@@ -156,7 +153,7 @@ MODEL = MuscleModel(
     tension=tension,
     steady=steady,
     series=series,
-    reading=reading,
+    readings={"velocity": ("rate", shortening_velocity)},
     at_full_force=at_full_force,
     lengthening=lengthening,
     compliance=compliance,

@@ -135,7 +135,6 @@ class Track:
 
 
 Series = Iterator[tuple[str, str, Values]]  # quantity, kind of unit, values
-Reading = Mapping[str, tuple[str, float]]  # by quantity: kind of unit, value
 
 
 def units_of(turns: bool) -> dict[str, str]:
@@ -199,7 +198,7 @@ class MuscleModel:
         tension: True tension at a state.
         steady: States at rest for ``u`` and ``length``.
         series: What a recording shows of it.
-        reading: What its elements do at a moment, from muscle, states, length and length rate.
+        readings: What its elements do at a moment, by name: kind of unit, and equation.
         at_full_force: Stiffness [force/length], rate [1/s] at which it yields to a stretch, and
             viscosity [force·s/length], about rest at full activation; from these follows how long
             a timestep may be.
@@ -226,7 +225,7 @@ class MuscleModel:
     tension: Equation
     steady: Equation
     series: Callable[[Track], Series]
-    reading: Callable[[Any, Mapping[str, float], float, float], Reading]
+    readings: Mapping[str, tuple[str, Equation]]
     at_full_force: Equation
     lengthening: Equation
     compliance: Equation
@@ -245,6 +244,8 @@ class MuscleModel:
         Raises:
             TypeError: An equation names something unknown, or a parameter before a state.
         """
+        for name, (_, equation) in self.readings.items():
+            self._check_arguments(name, equation)
         for name in ("rates", "force", "derivatives", "tension", "steady", "at_full_force",
                      "lengthening", "compliance", "time_constants", "fault"):  # fmt: skip
             self._check_arguments(name, getattr(self, name))
@@ -313,8 +314,9 @@ class MuscleModel:
         names = arguments(equation)
         head = [order.index(name) for name in names if name not in self.parameter_names]
         tail = [getattr(muscle, name) for name in names[len(head) :]]
-        if head == list(range(len(order))):
-            return lambda *values: equation(*values, *tail)
+        if head and head == list(range(head[0], head[-1] + 1)):
+            part = slice(head[0], head[-1] + 1)
+            return lambda *values: equation(*values[part], *tail)
         return lambda *values: equation(*[values[k] for k in head], *tail)
 
     def ask(self, equation: Equation, muscle: Muscle, **context: Any) -> Any:

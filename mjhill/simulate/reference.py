@@ -349,14 +349,12 @@ def _muscle_series(
     for k, state in enumerate(model.states):
         if state.share:
             columns[state.name] = "-", states[:, k]
-    rows = list(
-        zip(u.tolist(), states.tolist(), lengths.tolist(), length_rates.tolist(), strict=True)
-    )
-    readings = [
-        model.reading(muscle, dict(zip(model.state_names, row[1], strict=False)), *row[2:])
-        for row in rows
-    ]
-    for quantity, (kind, _) in readings[0].items():
-        columns[quantity] = kind, np.array([reading[quantity][1] for reading in readings])
+    order = ("u", *model.state_names, "length", "length_rate")
+    named = states[:, : len(model.states)].T
+    given = list(zip(*(v.tolist() for v in (u, *named, lengths, length_rates)), strict=True))
+    for quantity, (kind, equation) in model.readings.items():
+        value = model.bound(equation, muscle, order)
+        columns[quantity] = kind, np.array([value(*row) for row in given])
+    rows = zip(*(v.tolist() for v in (u, states, lengths, length_rates)), strict=True)
     columns["force"] = "force", np.array([equations(*row)[1] for row in rows])
     return columns
