@@ -9,7 +9,7 @@ import numpy as np
 
 from mjhill import JOINTS
 from mjhill.experiments.result import Claim, Measure, Result
-from mjhill.lab.rig import rig, run, still, strongest_angle
+from mjhill.lab.rig import at_rest, build_rig, record_run, strongest_angle
 from mjhill.report import Entry
 from mjhill.simulate.recording import Recording
 
@@ -56,10 +56,10 @@ class Rise(Result):
 
 
 def rise(joint="elbow", *, level=0.5, duration=0.05, exact=False, progress=None):
-    bench = rig(JOINTS[joint], exact=exact)
+    bench = build_rig(JOINTS[joint], exact=exact)
     muscle = next(iter(JOINTS[joint].muscles))
-    start = still(bench, strongest_angle(JOINTS[joint], muscle))
-    recording = run(bench, start, duration, excitation={muscle: level})
+    start = at_rest(bench, strongest_angle(JOINTS[joint], muscle))
+    recording = record_run(bench, start, duration, excitation={muscle: level})
     progress(0.5)
     return Rise(joint, recording, float(recording[f"{muscle}.force"].max()))
 

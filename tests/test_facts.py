@@ -13,14 +13,14 @@ from mjhill.experiments.trials.free_velocity import free_velocity
 from mjhill.experiments.trials.impedance import held_impedance, passive_stiffness, stiffness_slope
 from mjhill.experiments.trials.muscle_twitch import muscle_twitch
 from mjhill.experiments.trials.turn import turn
-from mjhill.lab.posture import holding
+from mjhill.lab.postures import holding_excitations
 from mjhill.lab.rig import (
     UnmeasuredError,
-    angles,
+    angle_series,
+    at_rest,
+    build_rig,
     muscle_torque,
-    rig,
-    run,
-    still,
+    record_run,
     strongest_angle,
 )
 from mjhill.literature.facts import Fact, facts, read_entries
@@ -53,24 +53,26 @@ def turn_of(joint, degrees, braked):
 
 
 def test_a_search_sees_the_angles_of_the_recorded_run_bit_for_bit():
-    bench = rig(make_joint())
+    bench = build_rig(make_joint())
     inputs = {"puller": mjhill.pulse(1.0, 0.0, 0.05), "opponent": mjhill.pulse(1.0, 0.05, 0.03)}
-    start = still(bench, 0.2)
-    searched = angles(bench, start, 0.2, inputs)
-    assert np.array_equal(searched, run(bench, start, 0.2, excitation=inputs)["joint.angle"])
+    start = at_rest(bench, 0.2)
+    searched = angle_series(bench, start, 0.2, inputs)
+    assert np.array_equal(searched, record_run(bench, start, 0.2, excitation=inputs)["joint.angle"])
 
 
 @pytest.mark.parametrize("angle", [-0.5, 0.0, 0.5])
 def test_a_joint_stays_where_it_is_held(angle):
     joint = make_joint()
-    bench, levels = rig(joint), holding(joint, "puller", angle)
-    end = run(bench, still(bench, angle, levels), 0.5, excitation=levels)["joint.angle"][-1]
+    bench, levels = build_rig(joint), holding_excitations(joint, "puller", angle)
+    end = record_run(bench, at_rest(bench, angle, levels), 0.5, excitation=levels)["joint.angle"][
+        -1
+    ]
     assert end == pytest.approx(angle, abs=1e-6)
 
 
 def test_a_joint_too_stiff_for_its_muscle_is_not_held():
     with pytest.raises(UnmeasuredError, match="full input of puller does not hold joint"):
-        holding(make_joint(stiffness=100.0), "puller", 0.5)
+        holding_excitations(make_joint(stiffness=100.0), "puller", 0.5)
 
 
 # --- turns

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from mjhill.lab.frequency import (
+from mjhill.analysis.frequency import (
     SecondOrderFrequency,
     decibel,
     fit_second_order,

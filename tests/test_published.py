@@ -4,7 +4,7 @@ from types import MappingProxyType
 import pytest
 
 import mjhill
-from mjhill.lab.rig import muscle_torque, rig, run, still
+from mjhill.lab.rig import at_rest, build_rig, muscle_torque, record_run
 from mjhill.literature.published import (
     EndAngle,
     PassiveTorque,
@@ -97,8 +97,8 @@ def test_the_net_torque_is_zero_at_the_end_and_pushes_back_to_it(item):
 @pytest.mark.parametrize("muscle", ["elbow_flexor", "elbow_extensor"])
 def test_a_run_at_full_effort_ends_there(elbow, muscle):
     joint = replace(elbow, damping=2.0)  # damped well, so that it settles
-    bench = rig(joint)
-    recording = run(bench, still(bench, joint.rest_angle), 4.0, excitation={muscle: 1.0})
+    bench = build_rig(joint)
+    recording = record_run(bench, at_rest(bench, joint.rest_angle), 4.0, excitation={muscle: 1.0})
     end = EndAngle("elbow", muscle, 0.0, 1.0, "").measured(joint)
     assert recording["elbow.angle"][-1] == pytest.approx(end, abs=1e-3)  # of 1.2 rad
 

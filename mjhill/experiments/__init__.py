@@ -7,19 +7,19 @@ and return what was measured, what the paper says of it and a figure; see ``Resu
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from mjhill.experiments.external_impulse import external_impulse as external_impulse
+from mjhill.experiments.external_sinusoid import external_sinusoid as external_sinusoid
+from mjhill.experiments.free_pulse import free_pulse as free_pulse
+from mjhill.experiments.isotonic import isotonic as isotonic
+from mjhill.experiments.neural_sinusoid import neural_sinusoid as neural_sinusoid
 from mjhill.experiments.result import Claim as Claim
 from mjhill.experiments.result import Measure as Measure
 from mjhill.experiments.result import Result as Result
+from mjhill.experiments.spring_release import spring_release as spring_release
 
 if TYPE_CHECKING:
-    from mjhill.experiments.paper.external_impulse import external_impulse as external_impulse
-    from mjhill.experiments.paper.external_sinusoid import external_sinusoid as external_sinusoid
-    from mjhill.experiments.paper.free_pulse import free_pulse as free_pulse
-    from mjhill.experiments.paper.isotonic import isotonic as isotonic
     from mjhill.experiments.paper.isovelocity import isovelocity as isovelocity
     from mjhill.experiments.paper.lengthening import lengthening as lengthening
-    from mjhill.experiments.paper.neural_sinusoid import neural_sinusoid as neural_sinusoid
-    from mjhill.experiments.paper.spring_release import spring_release as spring_release
     from mjhill.experiments.paper.step import step as step
     from mjhill.experiments.paper.synergists import synergists as synergists
     from mjhill.experiments.paper.tetanus import tetanus as tetanus

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mjhill.analysis.second_order import SecondOrderStep, fit_step, step_response
 from mjhill.identification.free import Free, joint_at
 from mjhill.joints.joint import Joint
-from mjhill.lab.ensemble import angles
+from mjhill.lab.batch import joint_angles
 from mjhill.literature.published import EndAngle, PassiveTorque, end_angles, passive_torques
 from mjhill.literature.table2 import SHAPE_SPREAD, Row, rows_of
 
@@ -62,7 +62,7 @@ class Evidence:
         for k, (name, row) in enumerate(self.steps):
             inputs[:, k, muscles.index(name)] = row.level
             start[:, k] = [joint.postures[name] for joint in joints]
-        runs = angles(
+        runs = joint_angles(
             [joint for joint in joints for _ in self.steps],
             start=start.ravel(),
             excitation=inputs.reshape(-1, 1, len(muscles)),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mjhill.identification.measurement import Measurement
 from mjhill.joints.joint import Joint
-from mjhill.lab.ensemble import angles, driving_torques
+from mjhill.lab.batch import driving_torques, joint_angles
 
 QUANTITIES = ("angle", "torque")  # what can be predicted
 _OTHER = {"angle": "torque", "torque": "angle"}
@@ -73,7 +73,7 @@ class Trial:
             )
         else:
             start, velocity = self.start[:, None] + self.start_spread[:, None] * offsets
-            run = angles(
+            run = joint_angles(
                 joints,
                 start=start,
                 velocity=velocity,

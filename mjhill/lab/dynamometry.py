@@ -14,16 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 from mjhill.engine.install import installed
 from mjhill.engine.layout import addresses
 from mjhill.joints.joint import Joint
+from mjhill.lab.batch import check_batch
 from mjhill.lab.rig import (
     Dynamometer,
     Rig,
-    check_batch,
+    at_rest,
+    build_rig,
     direction,
     dynamometer,
     net_torque,
-    rig,
-    run,
-    still,
+    record_run,
 )
 from mjhill.simulate.recording import Recording
 from mjhill.simulate.signals import Signal, constant
@@ -68,7 +68,7 @@ def machine_giving_way(joint: Joint, deflection: float, ringing: float = 0.0) ->
     """
     stiffness = max(muscle.max_isometric_force for muscle in joint.muscles.values()) / deflection
     frequency = max(sqrt(stiffness / joint.inertia) / (2 * pi), ringing)
-    return dynamometer(joint, min(frequency, _FASTEST / rig(joint).timestep))
+    return dynamometer(joint, min(frequency, _FASTEST / build_rig(joint).timestep))
 
 
 def zeroed(
@@ -112,12 +112,12 @@ def runs(
     Raises:
         UnmeasuredError: MuJoCo warned that a run went bad.
     """
-    bench = rig(joint, machine=machine)
+    bench = build_rig(joint, machine=machine)
     model, paths = bench.model, np.atleast_2d(np.asarray(path, dtype=np.float64))
     count, steps = paths.shape
     batch = mujoco.batch.Batch(model, nsim=count)
     for i, angle in enumerate(paths[:, 0].tolist()):
-        pose = still(bench, angle, before)
+        pose = at_rest(bench, angle, before)
         batch.qpos[i], batch.act[i] = pose.qpos, pose.act
     first = np.array(batch.act)
     control = np.zeros((count, steps, model.nu))  # one input and one output an actuator
@@ -145,14 +145,16 @@ def recorded(
     joint: Joint, machine: Dynamometer, path: Values, muscle: str, *, before: float, level: float
 ) -> Recording:
     """One of the runs of ``active_torque`` as a recording, for the film; path of shape (T,)."""
-    bench, steady = rig(joint, machine=machine), {muscle: before}
+    bench, steady = build_rig(joint, machine=machine), {muscle: before}
     drive = driven(bench, machine, path[np.newaxis], steady)[0]
     since = bench.timestep * np.arange(len(path))
     inputs = {
         muscle: constant(level),
         "dynamometer": Signal(lambda time: float(np.interp(time, since, drive))),
     }
-    return run(bench, still(bench, float(path[0]), steady), float(since[-1]), excitation=inputs)
+    return record_run(
+        bench, at_rest(bench, float(path[0]), steady), float(since[-1]), excitation=inputs
+    )
 
 
 def active_torque(

@@ -1,4 +1,4 @@
-"""A joint on the bench: its smallest model, started still and driven."""
+"""A rig: one joint in its smallest model, and runs of it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from math import pi
 
 import mujoco
-import mujoco.batch
 import mujoco.rollout
 import numpy as np
 from numpy.typing import NDArray
@@ -17,27 +16,26 @@ from mjhill.engine.install import installed, without_python_callbacks
 from mjhill.engine.spec import joint_spec
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import JOINTS
-from mjhill.lab.ensemble import check_warnings
 from mjhill.muscles.readings import steady_stretch, tension
 from mjhill.simulate.recording import Recording
 from mjhill.simulate.reference import plant_torque
 from mjhill.simulate.run import record
 from mjhill.simulate.signals import Signal
 
-_TIMESTEPS = {"eye": 0.5e-3}  # [s]; its inertia and damping make it ten times as fast
-_TIMESTEP = 1e-3  # of every other joint [s]
-_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS  # time, angle, velocity, then the muscles' states
+_TIMESTEP = 1e-3  # of most joints [s]
+_TIMESTEPS = {"eye": 0.5e-3}  # [s]; the eye is ten times as fast
+_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS  # time, angle, velocity, then muscle states
 
 
 class UnmeasuredError(RuntimeError):
-    """What was to be measured is not seen in this joint; the message says why."""
+    """The quantity cannot be measured on this joint; the message says why."""
 
 
 def as_joint(joint: str | Joint) -> Joint:
-    """A joint that comes with mjhill, by name; any other as it is.
+    """The joint itself, or mjhill's joint of that name.
 
     Raises:
-        ValueError: There is none of that name.
+        ValueError: The name is unknown.
     """
     if isinstance(joint, Joint):
         return joint
@@ -47,10 +45,10 @@ def as_joint(joint: str | Joint) -> Joint:
 
 
 def as_muscle(joint: Joint, muscle: str | None) -> str:
-    """A muscle of a joint by name; the first, which pulls towards positive angles, for None.
+    """The muscle's name, checked; None gives the first, which pulls towards positive angles.
 
     Raises:
-        ValueError: There is none of that name.
+        ValueError: The joint has no muscle of that name.
     """
     if muscle is None:
         return next(iter(joint.muscles))
@@ -66,7 +64,7 @@ class Rig:
 
     Attributes:
         joint: The joint.
-        model: Its model, one hinge and the muscles.
+        model: MuJoCo model of one hinge and the muscles.
     """
 
     joint: Joint
@@ -74,28 +72,27 @@ class Rig:
 
     @property
     def timestep(self) -> float:
-        """Step of the simulation [s]."""
+        """Timestep of the simulation [s]."""
         return float(self.model.opt.timestep)
 
 
 @dataclass(frozen=True)
 class Dynamometer:
-    """A machine that holds the joint to a path: a motor behind a coupling of finite stiffness.
+    """A machine that moves the joint along a path: a motor behind a coupling of finite stiffness.
 
-    It is an actuator ``dynamometer`` of the model. Its input is the path's ``drive`` [N·m], its
-    force the torque in the coupling, which is what its gauge reads, the joint's inertial torque
-    included.
+    It is the actuator ``dynamometer`` of the model. Its control is ``drive`` [N·m]. Its force is
+    the torque in the coupling, which a gauge would read; that includes the inertial torque.
 
     Attributes:
-        stiffness: Of the coupling [N·m/rad].
-        damping: Of the coupling [N·m·s/rad].
+        stiffness: Stiffness of the coupling [N·m/rad].
+        damping: Damping of the coupling [N·m·s/rad].
     """
 
     stiffness: float
     damping: float
 
     def drive(self, angle: float, velocity: float = 0.0) -> float:
-        """Input [N·m] that holds the joint to an angle [rad] that moves at a velocity [rad/s]."""
+        """Control [N·m] for a motor at an angle [rad] that moves at a velocity [rad/s]."""
         return self.stiffness * angle + self.damping * velocity
 
 
@@ -104,8 +101,8 @@ class Spring:
     """A linear spring between the joint and the ground.
 
     Attributes:
-        stiffness: [N·m/rad].
-        rest: Angle at which it is slack [rad].
+        stiffness: Stiffness [N·m/rad].
+        rest: Angle at which the spring has no torque [rad].
     """
 
     stiffness: float
@@ -113,12 +110,12 @@ class Spring:
 
 
 def dynamometer(joint: Joint, frequency: float) -> Dynamometer:
-    """A dynamometer on whose coupling the joint rings at a frequency [Hz], critically damped."""
-    pulsation = 2 * pi * frequency
-    return Dynamometer(joint.inertia * pulsation**2, 2 * joint.inertia * pulsation)
+    """A dynamometer; joint and coupling have a natural frequency [Hz] and critical damping."""
+    omega = 2 * pi * frequency
+    return Dynamometer(joint.inertia * omega**2, 2 * joint.inertia * omega)
 
 
-def rig(
+def build_rig(
     joint: Joint,
     *,
     exact: bool = False,
@@ -126,16 +123,16 @@ def rig(
     spring: Spring | None = None,
     added_inertia: float = 0.0,
 ) -> Rig:
-    """A joint on the bench.
+    """A rig for a joint.
 
     Args:
         joint: The joint.
-        exact: Whether to integrate by RK4; the half step by which Euler's method is early takes
-            half a step's worth of stiffness off the damping that a fit finds.
-        machine: A dynamometer on the joint; the joint is then integrated by implicitfast, which
-            is stable with a stiff coupling.
+        exact: Whether to integrate with RK4. Euler's method is half a step early, and a fit then
+            finds too little damping, by half a step times the stiffness.
+        machine: A dynamometer on the joint. The integrator is then implicitfast, which is stable
+            with a stiff coupling.
         spring: A spring on the joint.
-        added_inertia: Of a body fixed to the limb [kg·m²].
+        added_inertia: Inertia of a body fixed to the limb [kg·m²].
     """
     spec = joint_spec(joint)
     spec.option.timestep = _TIMESTEPS.get(joint.name, _TIMESTEP)
@@ -168,83 +165,80 @@ def _mount(spec: mujoco.MjSpec, joint: str, machine: Dynamometer) -> None:
     )
 
 
-def still(bench: Rig, angle: float, levels: Mapping[str, float] | None = None) -> mujoco.MjData:
-    """The joint without velocity at an angle [rad], its muscles steady at some inputs or 0."""
-    data = mujoco.MjData(bench.model)
+def at_rest(
+    rig: Rig, angle: float, excitations: Mapping[str, float] | None = None
+) -> mujoco.MjData:
+    """State without velocity at an angle [rad]; muscles are steady at their excitations, or 0."""
+    data = mujoco.MjData(rig.model)
     data.qpos[0] = angle
-    for name, level in (levels or {}).items():
-        data.actuator(name).ctrl = level
-    equilibrate(bench.model, data)
+    for name, u in (excitations or {}).items():
+        data.actuator(name).ctrl = u
+    equilibrate(rig.model, data)
     return data
 
 
-def run(
-    bench: Rig,
+def record_run(
+    rig: Rig,
     data: mujoco.MjData,
     duration: float,
     *,
     excitation: Mapping[str, Signal | float] | None = None,
     torque: Signal | float = 0.0,
 ) -> Recording:
-    """A recorded run of ``duration`` [s] under inputs and an external torque [N·m].
+    """Recording of a run of ``duration`` [s] from a state.
+
+    Args:
+        rig: The rig.
+        data: The state at the start; it is advanced.
+        duration: Length of the run [s].
+        excitation: Excitation over time by muscle [-]; others keep their control.
+        torque: External torque on the joint [N·m].
 
     Raises:
-        UnmeasuredError: MuJoCo warned that the run went bad.
+        UnmeasuredError: MuJoCo warned that the simulation went bad.
     """
     with installed():
         try:
             return record(
-                bench.model,
+                rig.model,
                 data,
                 duration=duration,
                 excitation=excitation,
-                torque={bench.joint.name: torque},
+                torque={rig.joint.name: torque},
             )
         except RuntimeError as error:
             raise UnmeasuredError(str(error)) from error
 
 
-def check_batch(batch: mujoco.batch.Batch, joint: Joint) -> None:
-    """Refuse simulations in which MuJoCo warned: they stop, or go on from a state put back.
-
-    Raises:
-        UnmeasuredError: One did; the message has the warning's name.
-    """
-    try:
-        check_warnings(batch, joint.name)
-    except RuntimeError as error:
-        raise UnmeasuredError(str(error)) from error
-
-
-def angles(
-    bench: Rig, start: mujoco.MjData, duration: float, excitation: Mapping[str, Signal]
+def angle_series(
+    rig: Rig, start: mujoco.MjData, duration: float, excitation: Mapping[str, Signal]
 ) -> NDArray[np.float64]:
-    """Angle [rad] at every step of the run that ``run`` would record, shape (T + 1,).
+    """Joint angle [rad] at every step of the run that ``record_run`` would record, shape (T + 1,).
 
-    Bit for bit the same and thirty times as fast, for searches; ``start`` stays as it is.
+    Bit for bit the same, thirty times as fast, and ``start`` is not changed: made for searches.
     """
-    steps = round(duration / bench.timestep)
+    steps = round(duration / rig.timestep)
     control = np.tile(start.ctrl, (1, steps, 1))
     for name, signal in excitation.items():
-        index = bench.model.actuator_ctrladr[bench.model.actuator(name).id]
-        # held over each step at the value of mid-step, as in a recorded run
-        control[0, :, index] = [signal((k + 0.5) * bench.timestep) for k in range(steps)]
-    state = np.empty(mujoco.mj_stateSize(bench.model, _STATE))
-    mujoco.mj_getState(bench.model, start, state, _STATE)
+        index = rig.model.actuator_ctrladr[rig.model.actuator(name).id]
+        # constant over each step, with the value at mid-step, as in a recorded run
+        control[0, :, index] = [signal((k + 0.5) * rig.timestep) for k in range(steps)]
+    state = np.empty(mujoco.mj_stateSize(rig.model, _STATE))
+    mujoco.mj_getState(rig.model, start, state, _STATE)
     with installed():
         states, _ = mujoco.rollout.rollout(
-            bench.model, mujoco.MjData(bench.model), state[np.newaxis], control
+            rig.model, mujoco.MjData(rig.model), state[np.newaxis], control
         )
     return np.concatenate([state[1:2], states[0, :, 1]])
 
 
 def direction(joint: Joint, muscle: str) -> float:
-    """1 where a muscle pulls towards positive angles, -1 where towards negative ones."""
+    """1 for a muscle that pulls towards positive angles, else -1."""
     return -float(np.sign(joint.gears[muscle]))
 
 
 def antagonist(joint: Joint, muscle: str) -> str:
-    """The first muscle that pulls the other way.
+    """The first muscle that pulls in the other direction.
 
     Raises:
         ValueError: There is none.
@@ -255,20 +249,23 @@ def antagonist(joint: Joint, muscle: str) -> str:
     raise ValueError(f"{joint.name}: no muscle pulls against {muscle!r}")
 
 
-def muscle_torque(joint: Joint, muscle: str, level: float, angle: float) -> float:
-    """Steady torque [N·m] of a muscle at an input, the joint held at an angle [rad]."""
+def muscle_torque(joint: Joint, muscle: str, excitation: float, angle: float) -> float:
+    """Steady torque [N·m] of a muscle at an excitation [-] and a constant angle [rad]."""
     parameters, length = joint.muscles[muscle], joint.gears[muscle] * angle
-    force = tension(parameters, steady_stretch(parameters, level, length))
+    force = tension(parameters, steady_stretch(parameters, excitation, length))
     return -joint.gears[muscle] * force
 
 
-def net_torque(joint: Joint, inputs: Mapping[str, float], angle: float) -> float:
-    """Steady torque [N·m] of muscles and passive elasticity at an angle [rad]; inputs 0 unnamed."""
-    pulls = (muscle_torque(joint, name, inputs.get(name, 0.0), angle) for name in joint.muscles)
+def net_torque(joint: Joint, excitations: Mapping[str, float], angle: float) -> float:
+    """Steady torque [N·m] of muscles and passive elasticity at an angle [rad].
+
+    The excitation of a muscle without an entry is 0.
+    """
+    pulls = (muscle_torque(joint, m, excitations.get(m, 0.0), angle) for m in joint.muscles)
     return plant_torque(joint, angle) + sum(pulls)
 
 
 def strongest_angle(joint: Joint, muscle: str) -> float:
-    """Angle [rad] in the range of motion at which a muscle's isometric force is largest."""
+    """Angle [rad] in the range of motion at which the muscle's isometric force is largest."""
     low, high = joint.range
     return min(max(joint.muscles[muscle].optimal_length / joint.gears[muscle], low), high)

@@ -9,6 +9,7 @@ from typing import Any
 
 from mjhill.joints.reader import JOINTS
 
+_PAPER = ("synergists", "twitch", "tetanus", "isovelocity", "step", "lengthening")
 _TABLE_2 = ("elbow", "wrist", "wrist_rotation", "knee", "ankle", "head", "eye")
 
 
@@ -67,7 +68,8 @@ class Part:
 
 
 def _entry(name: str, *joints: str, filmed: bool = False, anywhere: bool = True) -> Entry:
-    return Entry(name, f"mjhill.experiments.paper.{name}:{name}", joints, filmed, anywhere)
+    folder = "experiments.paper" if name in _PAPER else "experiments"
+    return Entry(name, f"mjhill.{folder}.{name}:{name}", joints, filmed, anywhere)
 
 
 CATALOGUE = (

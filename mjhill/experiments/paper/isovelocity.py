@@ -29,7 +29,7 @@ from mjhill.lab.rig import (
     UnmeasuredError,
     as_joint,
     as_muscle,
-    rig,
+    build_rig,
 )
 from mjhill.simulate.recording import Recording
 
@@ -170,7 +170,7 @@ def _bare_share(joint: Joint, muscle: str, machine: Dynamometer) -> float:
     Raises:
         UnmeasuredError: It is not much less than it has.
     """
-    one, timestep = joint.muscles[muscle], rig(joint).timestep
+    one, timestep = joint.muscles[muscle], build_rig(joint).timestep
     limit = (4 * joint.inertia + 2 * timestep * machine.damping) / timestep**2
     steepest = one.eccentric_plateau * one.max_isometric_force * one.series_shape
     steepest *= joint.gears[muscle] ** 2 / ((1 - exp(-one.series_shape)) * one.series_stretch)
@@ -187,6 +187,6 @@ def _recording(joint: Joint, machine: Dynamometer, sweep: Sweep) -> dict[str, Re
     """A contraction at the middle of the velocities of shortening, started relaxed."""
     shortening = sweep.velocities[sweep.shortening]
     one = replace(sweep, velocities=shortening[len(shortening) // 2 :][:1])
-    path, _ = paths(one, rig(joint).timestep)
+    path, _ = paths(one, build_rig(joint).timestep)
     recording = recorded(joint, machine, path[0], sweep.muscle, before=0.0, level=1.0)
     return {f"{degrees(one.velocities[0]):.0f}°/s, started relaxed": recording}

@@ -14,7 +14,7 @@ from mjhill.experiments.result import Claim, Measure, Result
 from mjhill.experiments.trials.stretch import AFTER, Stretch, stretch, stretch_path
 from mjhill.joints.joint import Joint
 from mjhill.lab.dynamometry import recorded, stiff_machine
-from mjhill.lab.rig import as_joint, as_muscle, direction, rig
+from mjhill.lab.rig import as_joint, as_muscle, build_rig, direction
 from mjhill.lab.velocity_clamp import check_velocity
 from mjhill.simulate.recording import Recording
 
@@ -152,7 +152,7 @@ def lengthening(
     start, end = _ends(subject, chosen, amplitude)
     top = subject.muscles[chosen].max_velocity / abs(subject.gears[chosen])
     speeds = sorted([top * share for share in SHARES] if velocities is None else velocities)
-    _check(speeds, levels, amplitude, rig(subject).timestep)
+    _check(speeds, levels, amplitude, build_rig(subject).timestep)
     machine, found = stiff_machine(subject), {}
     ordered = tuple(sorted(levels))
     for count, level in enumerate(ordered, 1):
@@ -197,7 +197,7 @@ def _recording(
     joint: Joint, muscle: str, one: Stretch, start: float, end: float
 ) -> dict[str, Recording]:
     """A run of one of the stretches."""
-    machine, timestep = stiff_machine(joint), rig(joint).timestep
+    machine, timestep = stiff_machine(joint), build_rig(joint).timestep
     time, path = stretch_path(start, end, one.velocity, timestep)
     shown = path[time < one.stop + _SHOWN_AFTER]
     recording = recorded(joint, machine, shown, muscle, before=one.level, level=one.level)

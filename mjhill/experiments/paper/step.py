@@ -22,7 +22,7 @@ from mjhill.experiments.result import Claim, Measure, Result, spoken
 from mjhill.experiments.trials.proportion import LONG, proportions, step_responses
 from mjhill.experiments.trials.step_fit import StepFit, fitted_step
 from mjhill.joints.joint import Joint
-from mjhill.lab.rig import as_joint, rig, run, still
+from mjhill.lab.rig import as_joint, at_rest, build_rig, record_run
 from mjhill.lab.variants import AS_IT_IS, FLAT, LINEAR
 from mjhill.literature.table2 import SHAPE_SPREAD, rows_of
 from mjhill.simulate.recording import Recording
@@ -171,7 +171,7 @@ def step(
     joint = as_joint(joint)
     if len(levels) < 2 or list(levels) != sorted({u for u in levels if 0 < u <= 1}):
         raise ValueError(f"levels must be at least two, ascending, in (0, 1], got {list(levels)}")
-    told, bench = progress or (lambda _: None), rig(joint)
+    told, bench = progress or (lambda _: None), build_rig(joint)
     tasks = [(muscle, float(level)) for muscle in joint.muscles for level in levels]
     starts = [joint.postures.get(muscle, joint.rest_angle) for muscle, _ in tasks]
     responses = step_responses([joint] * len(tasks), tasks, starts, bench.timestep)
@@ -187,8 +187,8 @@ def step(
         for task, start, response in zip(tasks, starts, responses, strict=True)
     )
     filmed = steps[len(levels) - 1]
-    begin, excitation = still(bench, filmed.start), {filmed.muscle: filmed.level}
-    recording = run(bench, begin, float(time[-1]), excitation=excitation)
+    begin, excitation = at_rest(bench, filmed.start), {filmed.muscle: filmed.level}
+    recording = record_run(bench, begin, float(time[-1]), excitation=excitation)
     told(1.0)
     return Step(joint.name, time, steps, proportion, {filmed.name: recording})
 

@@ -19,7 +19,7 @@ import mjhill
 from mjhill.experiments.figures.synergists import draw
 from mjhill.experiments.result import Claim, Measure, Result
 from mjhill.joints.joint import Joint
-from mjhill.lab.rig import Rig, as_joint, rig, run, still
+from mjhill.lab.rig import Rig, as_joint, at_rest, build_rig, record_run
 from mjhill.muscles.equivalent import anatomical_muscle, equivalent_muscle, torque_at_velocity
 from mjhill.muscles.hill import Hill
 from mjhill.simulate.recording import Recording
@@ -163,6 +163,6 @@ def _with(joint: Joint, muscle: str, others: Mapping[str, Hill]) -> Joint:
 
 def _free_movement(joint: Joint, pulling: tuple[str, ...]) -> Recording:
     """The joint from rest under full input of some of its muscles."""
-    bench: Rig = rig(joint)
+    bench: Rig = build_rig(joint)
     inputs = dict.fromkeys(pulling, 1.0)
-    return run(bench, still(bench, joint.rest_angle), _DURATION, excitation=inputs)
+    return record_run(bench, at_rest(bench, joint.rest_angle), _DURATION, excitation=inputs)

@@ -16,7 +16,7 @@ from mjhill.experiments.figures.drawing import legend_above, tidy
 from mjhill.experiments.result import Claim, Measure, Result, spoken
 from mjhill.joints.joint import Joint
 from mjhill.lab.dynamometry import active_torque, stiff_machine, stimulated
-from mjhill.lab.rig import as_joint, rig
+from mjhill.lab.rig import as_joint, build_rig
 
 _DURATION = 2.0  # [s]; ten times the slowest rise
 _ANGLES = 15  # at which the largest torque is sought, ends of the range of motion included
@@ -193,7 +193,7 @@ def tetanus(
     machine = stiff_machine(subject)
     grid = np.linspace(*subject.range, _ANGLES)  # an odd number: mid-range is one of them
     middle = _ANGLES // 2
-    steps = round(_DURATION / rig(subject).timestep)
+    steps = round(_DURATION / build_rig(subject).timestep)
     path = np.repeat(grid[:, np.newaxis], steps, axis=1)
     voluntary, electrical, largest, best = {}, {}, {}, {}
     for count, muscle in enumerate(subject.muscles, 1):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mjhill.joints.joint import Joint
-from mjhill.lab.rig import UnmeasuredError, direction, rig, run, still
+from mjhill.lab.rig import UnmeasuredError, at_rest, build_rig, direction, record_run
 
 _TIME = 1.0  # [s]; the slowest joint has crossed its range by then
 
@@ -18,9 +18,9 @@ def free_velocity(joint: Joint, muscle: str) -> float:
         UnmeasuredError: The muscle does not move it.
     """
     along, (low, high) = direction(joint, muscle), joint.range
-    bench = rig(joint)
-    start = still(bench, low if along > 0 else high)
-    recording = run(bench, start, _TIME, excitation={muscle: 1.0})
+    bench = build_rig(joint)
+    start = at_rest(bench, low if along > 0 else high)
+    recording = record_run(bench, start, _TIME, excitation={muscle: 1.0})
     angle, velocity = recording[f"{joint.name}.angle"], along * recording[f"{joint.name}.velocity"]
     peak = float(velocity[(angle >= low) & (angle <= high)].max())
     if peak <= 0:

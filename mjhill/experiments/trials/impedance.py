@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.analysis.responses import SecondOrder, second_order_fit
-from mjhill.experiments.trials.swing import second_order_response
+from mjhill.analysis.swing import second_order_response
 from mjhill.joints.joint import Joint
 from mjhill.lab.rig import (
     Rig,
     UnmeasuredError,
+    at_rest,
+    build_rig,
     direction,
     muscle_torque,
     net_torque,
-    rig,
-    run,
-    still,
+    record_run,
 )
 from mjhill.simulate.recording import Recording
 from mjhill.simulate.reference import plant_torque
@@ -71,7 +71,7 @@ def held_impedance(joint: Joint, muscle: str, *, share: float, angle: float) -> 
         UnmeasuredError: The posture is not stable, or the joint does not move like a second-order
             system.
     """
-    bench = rig(joint, exact=True)
+    bench = build_rig(joint, exact=True)
     recording, hit, load = _hit_by_a_degree(bench, muscle, share, angle)
     # along the hit all is positive
     sign = -direction(joint, muscle)
@@ -115,8 +115,10 @@ def _hit_by_a_degree(
     sign = -direction(joint, muscle)
     hit = joint.inertia * _DEFLECTION / _HIT**2
     for _ in range(_TRIES):
-        start = still(bench, angle, levels)
-        recording = run(bench, start, _WINDOW, torque=sign * hit * pulse(1.0, 0.0, _HIT) + load)
+        start = at_rest(bench, angle, levels)
+        recording = record_run(
+            bench, start, _WINDOW, torque=sign * hit * pulse(1.0, 0.0, _HIT) + load
+        )
         reached = float((sign * (recording[f"{joint.name}.angle"] - angle)).max())
         if abs(reached - _DEFLECTION) <= _CLOSE * _DEFLECTION:
             return recording, hit, load

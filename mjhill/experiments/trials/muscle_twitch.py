@@ -12,10 +12,10 @@ from mjhill.joints.joint import Joint
 from mjhill.lab.dynamometry import active_torque, stiff_machine, zeroed
 from mjhill.lab.rig import (
     UnmeasuredError,
+    at_rest,
+    build_rig,
     direction,
-    rig,
-    run,
-    still,
+    record_run,
     strongest_angle,
 )
 from mjhill.simulate.recording import Recording
@@ -58,10 +58,10 @@ def muscle_twitch(joint: Joint, muscle: str, *, width: float = PULSE) -> MuscleT
         UnmeasuredError: It has not half relaxed by the end of the run.
     """
     machine, angle = stiff_machine(joint), strongest_angle(joint, muscle)
-    bench, along = rig(joint, machine=machine), direction(joint, muscle)
-    single = run(
+    bench, along = build_rig(joint, machine=machine), direction(joint, muscle)
+    single = record_run(
         bench,
-        still(bench, angle),
+        at_rest(bench, angle),
         TWITCH_TIME,
         excitation={
             "dynamometer": zeroed(joint, machine, angle),

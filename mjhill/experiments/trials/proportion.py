@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.joints.joint import Joint
-from mjhill.lab.ensemble import angles
+from mjhill.lab.batch import joint_angles
 from mjhill.lab.rig import direction
 from mjhill.lab.variants import (
     AS_IT_IS,
@@ -35,7 +35,7 @@ def step_responses(
     for i, (muscle, level) in enumerate(tasks):
         inputs[i, 0, names.index(muscle)] = level
     steps = round(LONG / timestep)
-    runs = angles(joints, start=starts, excitation=inputs, steps=steps, timestep=timestep)
+    runs = joint_angles(joints, start=starts, excitation=inputs, steps=steps, timestep=timestep)
     signs = np.array([direction(joints[0], muscle) for muscle, _ in tasks])
     return np.asarray(signs[:, None] * (runs - runs[:, :1]))
 

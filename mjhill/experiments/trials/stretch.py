@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mjhill.joints.joint import Joint
 from mjhill.lab.dynamometry import active_torque
-from mjhill.lab.rig import Dynamometer, rig
+from mjhill.lab.rig import Dynamometer, build_rig
 from mjhill.lab.velocity_clamp import clamped_path, own_torque, ramp_time, travel_time
 
 Values = NDArray[np.float64]
@@ -113,7 +113,7 @@ def stretch(
         velocity: At which it does, positive [rad/s].
         level: Neural input all the while [-].
     """
-    timestep, way = rig(joint).timestep, end - start
+    timestep, way = build_rig(joint).timestep, end - start
     time, path = stretch_path(start, end, velocity, timestep)
     _, torque = active_torque(joint, machine, path, muscle, before=level, level=level)
     grid = np.linspace(start, end, _GRID)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mjhill.joints.joint import Joint
 from mjhill.lab.dynamometry import active_torque
-from mjhill.lab.rig import Dynamometer, direction, rig
+from mjhill.lab.rig import Dynamometer, build_rig, direction
 from mjhill.lab.velocity_clamp import (
     RAMP_SHARE,
     check_velocity,
@@ -88,7 +88,7 @@ def make_sweep(joint: Joint, muscle: str, velocities: Values, angles: Values | N
     margin = _MARGIN * (high - low)
     ends = (low + margin, high - margin)
     long, short = ends if direction(joint, muscle) > 0 else ends[::-1]
-    way, timestep = short - long, rig(joint).timestep
+    way, timestep = short - long, build_rig(joint).timestep
     for velocity in velocities.tolist():
         check_velocity(velocity, way, timestep)
     read = np.asarray(long + way * np.array([0.25, 0.5, 0.75])) if angles is None else angles
@@ -111,7 +111,7 @@ def measure(joint: Joint, machine: Dynamometer, sweep: Sweep, *, before: float) 
         sweep: What is done.
         before: Input at which the muscle is steady before, 0 for a relaxed start.
     """
-    path, time = paths(sweep, rig(joint).timestep)
+    path, time = paths(sweep, build_rig(joint).timestep)
     runs, torque = active_torque(joint, machine, path, sweep.muscle, before=before)
     activation = runs.activation[sweep.muscle]
     peak, shape = np.empty(len(path)), (len(sweep.angles), len(path))
@@ -132,7 +132,7 @@ def measure(joint: Joint, machine: Dynamometer, sweep: Sweep, *, before: float) 
 def isometric(joint: Joint, machine: Dynamometer, sweep: Sweep) -> tuple[float, Values]:
     """Largest isometric torque on the way, and that at the angles of the sweep, shape (A,)."""
     grid = np.concatenate([sweep.angles, np.linspace(sweep.long, sweep.short, _GRID)])
-    steps = round(_ISOMETRIC_TIME / rig(joint).timestep)
+    steps = round(_ISOMETRIC_TIME / build_rig(joint).timestep)
     path = np.repeat(grid[:, np.newaxis], steps, axis=1)
     _, torque = active_torque(joint, machine, path, sweep.muscle)
     return float(torque[:, -1].max()), torque[: len(sweep.angles), -1]

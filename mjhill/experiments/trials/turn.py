@@ -21,16 +21,16 @@ from scipy.optimize import brentq
 
 from mjhill.analysis.responses import time_to
 from mjhill.joints.joint import Joint
-from mjhill.lab.posture import holding
+from mjhill.lab.postures import holding_excitations
 from mjhill.lab.rig import (
     Rig,
     UnmeasuredError,
-    angles,
+    angle_series,
     antagonist,
+    at_rest,
+    build_rig,
     direction,
-    rig,
-    run,
-    still,
+    record_run,
 )
 from mjhill.simulate.recording import Recording
 from mjhill.simulate.signals import Signal
@@ -115,7 +115,7 @@ class _Task:
     def trial(self, pulse: float, brake: float) -> NDArray[np.float64]:
         """Progress at every step."""
         inputs = self.inputs(pulse, brake)
-        return self.progress(angles(self.bench, self.start, self.duration, inputs))
+        return self.progress(angle_series(self.bench, self.start, self.duration, inputs))
 
     def excess(self, pulse: float, brake: float) -> float:
         """How far the turn goes past its amplitude, negative where it falls short [-]."""
@@ -146,10 +146,10 @@ def turn(
     Raises:
         UnmeasuredError: The joint cannot make such a turn.
     """
-    bench = rig(joint)
+    bench = build_rig(joint)
     first, last = _ends(joint, muscle, amplitude)
-    start = still(bench, first, holding(joint, muscle, first))
-    hold = holding(joint, muscle, last)
+    start = at_rest(bench, first, holding_excitations(joint, muscle, first))
+    hold = holding_excitations(joint, muscle, last)
     other = antagonist(joint, muscle)
     task = _Task(bench, muscle, other, start, amplitude, duration, hold)
     if task.excess(duration, 0.0) < 0:
@@ -157,7 +157,7 @@ def turn(
             f"full input does not turn it by {degrees(amplitude):g}° in {duration:g} s"
         )
     pulse, brake = _braked(task) if braked else (_unbraked(task), 0.0)
-    recording = run(bench, start, duration, excitation=task.inputs(pulse, brake))
+    recording = record_run(bench, start, duration, excitation=task.inputs(pulse, brake))
     velocity = direction(joint, muscle) * recording[f"{joint.name}.velocity"]
     return Turn(pulse, brake, velocity, task.progress(recording[f"{joint.name}.angle"]), recording)
 

@@ -10,7 +10,7 @@ from conftest import rest
 
 import mjhill
 from mjhill.engine.spec import joint_spec
-from mjhill.lab.ensemble import angles, driving_torques
+from mjhill.lab.batch import driving_torques, joint_angles
 from mjhill.simulate.reference import plant_torque
 
 STEPS = 300
@@ -62,7 +62,7 @@ def test_each_joint_moves_as_it_does_alone(elbow):
     joints = varied(elbow)
     flex, extend = mjhill.pulse(0.7, 0.02, 0.1), mjhill.step(0.4, 0.15)
     push = mjhill.sinusoid(3.0, 5.0)
-    found = angles(
+    found = joint_angles(
         joints,
         start=1.0,
         excitation=np.stack([mid_step(flex), mid_step(extend)], axis=1),
@@ -78,7 +78,7 @@ def test_each_joint_moves_as_it_does_alone(elbow):
 
 def test_inputs_and_starts_may_differ_from_joint_to_joint(elbow):
     start, level = np.array([0.6, 1.4]), np.array([[0.2, 0.0], [0.0, 0.5]])
-    found = angles(
+    found = joint_angles(
         [elbow, elbow],
         start=start,
         excitation=level[:, None, :],
@@ -92,7 +92,7 @@ def test_inputs_and_starts_may_differ_from_joint_to_joint(elbow):
 
 
 def test_a_joint_starts_at_its_angle_and_velocity(elbow):
-    found = angles([elbow], start=0.9, velocity=2.0, excitation=0.0, steps=5, timestep=1e-4)
+    found = joint_angles([elbow], start=0.9, velocity=2.0, excitation=0.0, steps=5, timestep=1e-4)
     assert found[0, 0] == 0.9
     # half a per mille of the velocity is lost to damping and elasticity in a step
     assert np.diff(found[0])[0] / 1e-4 == pytest.approx(2.0, rel=2e-3)
@@ -100,14 +100,14 @@ def test_a_joint_starts_at_its_angle_and_velocity(elbow):
 
 def test_a_joint_in_balance_under_steady_inputs_stays(elbow):
     level = np.array([0.3, 0.2])
-    settled = angles([elbow], start=1.2, before=level, excitation=level, steps=10_000)[0, -1]
-    stays = angles([elbow], start=settled, before=level, excitation=level, steps=STEPS)
+    settled = joint_angles([elbow], start=1.2, before=level, excitation=level, steps=10_000)[0, -1]
+    stays = joint_angles([elbow], start=settled, before=level, excitation=level, steps=STEPS)
     assert np.ptp(stays) < 1e-6  # what ten seconds left unsettled
 
 
 def test_a_simulation_that_goes_bad_is_an_error_that_names_the_joint(elbow, capfd):
     with pytest.raises(RuntimeError, match="elbow: MuJoCo warned 'badqacc' in 2 of 2 simulations"):
-        angles([elbow] * 2, start=1.0, excitation=0.0, torque=1e12, steps=5)
+        joint_angles([elbow] * 2, start=1.0, excitation=0.0, torque=1e12, steps=5)
     capfd.readouterr()  # MuJoCo says so too
 
 
@@ -142,7 +142,7 @@ def test_the_torque_that_moves_a_joint_is_recovered_from_its_path(elbow):
     joints = varied(elbow)
     torque = 4.0 * np.sin(12.0 * TIME[:-1]) ** 2
     excitation = np.stack([0.4 * (TIME[:-1] > 0.05), 0.2 * (TIME[:-1] > 0.12)], axis=1)
-    paths = angles(joints, start=1.0, excitation=excitation, torque=torque, steps=STEPS)
+    paths = joint_angles(joints, start=1.0, excitation=excitation, torque=torque, steps=STEPS)
     for joint, path in zip(joints, paths, strict=True):
         found = driving_torques([joint], path=path[:-1], excitation=excitation)[0]
         # derivatives of the path are differences, a step apart from each other
@@ -163,10 +163,12 @@ def test_driven_joints_do_not_disturb_each_other(elbow):
 @pytest.mark.parametrize("backend", ["compiled", "python"])
 def test_callbacks_in_place_change_nothing_and_stay(elbow, backend):
     inputs = {"excitation": np.full((20, 2), 0.4)}
-    moved = angles([elbow] * 3, start=1.0, steps=20, **inputs)
+    moved = joint_angles([elbow] * 3, start=1.0, steps=20, **inputs)
     driven = driving_torques([elbow] * 3, path=moved[0, :20], **inputs)
     with mjhill.installed(backend):
-        np.testing.assert_array_equal(moved, angles([elbow] * 3, start=1.0, steps=20, **inputs))
+        np.testing.assert_array_equal(
+            moved, joint_angles([elbow] * 3, start=1.0, steps=20, **inputs)
+        )
         np.testing.assert_array_equal(
             driven, driving_torques([elbow] * 3, path=moved[0, :20], **inputs)
         )

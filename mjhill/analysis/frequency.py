@@ -1,7 +1,7 @@
-"""Frequency responses: gain, phase and coherence at a driving frequency, second-order fits.
+"""Frequency responses: gain, phase and coherence, and their second-order fits.
 
-Frequencies are in Hz, phases in rad, negative where the output is late. A gain is in units of the
-output over those of the drive.
+Frequencies are in Hz. Phases are in rad, negative if the output is late. A gain is in units of the
+output over units of the input.
 """
 
 from __future__ import annotations
@@ -13,21 +13,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _Values = NDArray[np.float64]
-_WIDEST = 1e3  # how far outside the band a natural frequency, and how far from 1 a ratio, may be
+_WIDEST = 1e3  # largest factor of a natural frequency from the band, of a damping ratio from 1
 _DAMPING_STARTS = (0.3, 1.0, 3.0)  # the misfit can have several minima
 
 
 @dataclass(frozen=True)
 class Response:
-    """Answer to one sinusoid.
+    """Response to one sinusoid.
 
     Attributes:
-        gain: Amplitude of the output over that of the drive.
-        phase: Of the output before the drive, in (-π, π] [rad].
-        coherence: Share of the output's variance about a straight line that a sinusoid of the
-            driving frequency accounts for, times the same share of the drive [-]; 1 less this is
-            distortion. The coherence that averages spectra over segments would be 1 for any
-            periodic answer.
+        gain: Amplitude of the output over that of the input.
+        phase: Phase of the output minus that of the input, in (-π, π] [rad].
+        coherence: Share of the output's variance about a straight line that is at the driving
+            frequency, times the same share of the input [-]. The rest is distortion. (Coherence
+            from spectra averaged over segments would be 1 for any periodic response.)
     """
 
     gain: float
@@ -37,11 +36,11 @@ class Response:
 
 @dataclass(frozen=True)
 class SecondOrderFrequency:
-    """The response ``gain / (1 - r² + 2 i ζ r)`` with r the frequency over the natural one.
+    """The response ``gain / (1 - r² + 2 i ζ r)``, r the frequency over the natural frequency.
 
     Attributes:
-        gain: At frequency 0.
-        natural_frequency: [Hz].
+        gain: Gain at frequency 0.
+        natural_frequency: Undamped natural frequency [Hz].
         damping_ratio: ζ [-].
     """
 
@@ -54,26 +53,28 @@ class SecondOrderFrequency:
         ratio = np.asarray(frequency, dtype=np.float64) / self.natural_frequency
         return np.asarray(self.gain / (1.0 - ratio**2 + 2j * self.damping_ratio * ratio))
 
-    def off(self, frequency: ArrayLike, gain: ArrayLike, phase: ArrayLike) -> tuple[_Values, ...]:
-        """How far measured gains [dB] and phases [rad] are from the fit, with their signs."""
+    def errors(
+        self, frequency: ArrayLike, gain: ArrayLike, phase: ArrayLike
+    ) -> tuple[_Values, _Values]:
+        """Measured gains [dB] and phases [rad] minus those of the fit."""
         ratio = _complex(gain, phase) / self.response(frequency)
         return 20 * np.log10(np.abs(ratio)), np.angle(ratio)
 
 
-def response_at(time: _Values, drive: _Values, output: _Values, frequency: float) -> Response:
+def response_at(time: _Values, source: _Values, output: _Values, frequency: float) -> Response:
     """Gain, phase and coherence at one frequency, over the last whole cycles of a record.
 
-    A straight line is fitted beside the sinusoid, so that a slow drift does no harm.
+    A straight line is fitted together with the sinusoid, so that a slow drift does no harm.
 
     Args:
-        time: Evenly spaced sample times [s], shape (T,); leave the transient out.
-        drive: What drives, shape (T,).
-        output: What answers, shape (T,).
+        time: Evenly spaced sample times after the transient [s], shape (T,).
+        source: The input signal, shape (T,).
+        output: The output signal, shape (T,).
         frequency: The driving frequency [Hz].
 
     Raises:
-        ValueError: The record is shorter than a cycle, has fewer than four samples in one, or the
-            drive has nothing at this frequency.
+        ValueError: The record is shorter than a cycle, has fewer than four samples a cycle, or the
+            input does not contain the frequency.
     """
     step = float(time[1] - time[0])
     cycles = int(len(time) * step * frequency + 1e-6)
@@ -86,13 +87,13 @@ def response_at(time: _Values, drive: _Values, output: _Values, frequency: float
     turning = 2 * pi * frequency * time[last]
     line = np.stack([np.ones_like(turning), time[last] - time[last].mean()], axis=1)
     basis = np.column_stack([np.cos(turning), np.sin(turning), line])
-    (driving, drive_share), (answer, output_share) = (
-        _component(basis, values[last]) for values in (drive, output)
+    (cause, cause_share), (effect, effect_share) = (
+        _component(basis, values[last]) for values in (source, output)
     )
-    if abs(driving) <= 1e-12 * float(np.abs(drive).max(initial=0.0)):
-        raise ValueError(f"the drive has nothing at {frequency:g} Hz")
-    ratio = answer / driving
-    return Response(abs(ratio), float(np.angle(ratio)), drive_share * output_share)
+    if abs(cause) <= 1e-12 * float(np.abs(source).max(initial=0.0)):
+        raise ValueError(f"the input signal does not contain {frequency:g} Hz")
+    ratio = effect / cause
+    return Response(abs(ratio), float(np.angle(ratio)), cause_share * effect_share)
 
 
 def fit_second_order(
@@ -115,7 +116,7 @@ def fit_second_order(
     band, gains = np.asarray(frequency, dtype=np.float64), np.asarray(gain, dtype=np.float64)
     if band.ndim != 1 or len(band) < 2 or not (band.min() > 0 and gains.min() > 0):
         raise ValueError(
-            "a second-order fit needs at least two frequencies, they and the gains positive, got "
+            "a second-order fit needs two or more frequencies, all positive like the gains, got "
             f"frequencies {band.tolist()} and gains {gains.tolist()}"
         )
     measured, top = _complex(gains, phase), float(gains[band.argmin()])
@@ -145,27 +146,29 @@ def second_order_band(
     decibels: float = 3.0,
     degrees: float = 30.0,
 ) -> tuple[SecondOrderFrequency, float]:
-    """The widest band from the lowest frequency on that one second-order fit describes.
+    """The widest band, starting at the lowest frequency, that one second-order fit describes.
 
     Args:
         frequency: [Hz], shape (F,), ascending, at least four.
         gain: Shape (F,).
         phase: [rad], shape (F,).
-        decibels: How far a gain may be off anywhere in the band [dB].
-        degrees: How far a phase may be off anywhere in the band [°].
+        decibels: Largest error of a gain in the band [dB].
+        degrees: Largest error of a phase in the band [°].
 
     Returns:
-        The fit and the highest frequency of its band [Hz]; with no such band the fit of the first
-        three frequencies and 0.
+        The fit and the highest frequency of its band [Hz]. If there is no such band: the fit to
+        the first three frequencies, and 0.
     """
     band, gains, phases = (np.asarray(x, dtype=np.float64) for x in (frequency, gain, phase))
     kept, highest = fit_second_order(band[:3], gains[:3], phases[:3]), 0.0
-    # three numbers fitted to fewer than three frequencies prove nothing
+    # three parameters always fit fewer than three frequencies
     for count in range(3, len(band) + 1):
         part = slice(0, count)
         fit = fit_second_order(band[part], gains[part], phases[part])
-        off_gain, off_phase = fit.off(band[part], gains[part], phases[part])
-        fits = np.abs(off_gain).max() <= decibels and np.abs(off_phase).max() <= radians(degrees)
+        gain_errors, phase_errors = fit.errors(band[part], gains[part], phases[part])
+        fits = np.abs(gain_errors).max() <= decibels and np.abs(phase_errors).max() <= radians(
+            degrees
+        )
         if not fits:
             break
         kept, highest = fit, float(band[count - 1])
@@ -173,12 +176,12 @@ def second_order_band(
 
 
 def decibel(gain: ArrayLike, reference: float = 1.0) -> _Values:
-    """Gains in dB of a reference."""
+    """Gains in dB relative to a reference."""
     return 20 * np.log10(np.asarray(gain, dtype=np.float64)) - 20 * log10(reference)
 
 
 def octaves(low: float, high: float, per_octave: int = 3) -> _Values:
-    """Frequencies [Hz] from ``low`` to ``high``, evenly spaced in their logarithm.
+    """Frequencies [Hz] from ``low`` to ``high``, both included, evenly spaced on a log scale.
 
     Raises:
         ValueError: The band is empty or not positive.
@@ -189,9 +192,9 @@ def octaves(low: float, high: float, per_octave: int = 3) -> _Values:
 
 
 def _component(basis: _Values, values: _Values) -> tuple[complex, float]:
-    """Complex amplitude of cos and sin in ``values``, and the share of variance they explain.
+    """Complex amplitude of cos and sin in ``values``, and their share of the variance.
 
-    The other columns of ``basis`` are those of the line that the variance is about.
+    The other columns of ``basis`` span the straight line about which the variance is taken.
     """
     found, *_ = np.linalg.lstsq(basis, values, rcond=None)
     line = basis[:, 2:]
