@@ -11,8 +11,8 @@ from made_joint import MUSCLE
 import mjhill
 from mjhill.experiments.trials.free_velocity import free_velocity
 from mjhill.experiments.trials.impedance import held_impedance, passive_stiffness, stiffness_slope
-from mjhill.experiments.trials.muscle_twitch import muscle_twitch
 from mjhill.experiments.trials.turn import turn
+from mjhill.experiments.twitch import muscle_twitch
 from mjhill.lab.posture import holding
 from mjhill.lab.rig import (
     UnmeasuredError,

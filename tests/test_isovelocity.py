@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
-
-import mjhill
 from mjhill.experiments.paper.isovelocity import isovelocity
 from mjhill.experiments.trials.torque_velocity import isometric, make_sweep, measure
 from mjhill.lab.dynamometry import stiff_machine
-from mjhill.lab.rig import UnmeasuredError, muscle_torque
 from mjhill.lab.velocity_clamp import (
     clamped_path,
     contractile_force,
     own_torque,
     travel_time,
 )
+
+import mjhill
+from mjhill.lab.rig import UnmeasuredError, muscle_torque
 from mjhill.muscles.readings import shortening_velocity, steady_stretch, tension
 
 EVEN = replace(MUSCLE, width_short=50.0, width_long=50.0)  # as strong at any angle

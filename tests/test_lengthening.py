@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
+from mjhill.experiments.paper.lengthening import lengthening
 
 import mjhill
-from mjhill.experiments.paper.lengthening import lengthening
 from mjhill.lab.rig import muscle_torque
 
 EVEN = replace(MUSCLE, width_short=50.0, width_long=50.0)  # as strong at any angle

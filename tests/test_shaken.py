@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mjhill.lab.dynamometry import runs, stiff_machine
 
 import mjhill
 from mjhill.experiments.trials.sinusoids import shaken
 from mjhill.lab.drives import Drive
-from mjhill.lab.dynamometry import runs, stiff_machine
 from mjhill.lab.rig import UnmeasuredError, rig
 
 

@@ -5,11 +5,11 @@ from math import radians
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from mjhill.experiments.paper.step import Step, step
+from mjhill.experiments.trials.step_fit import fitted_step
 
 import mjhill
 from mjhill.analysis.second_order import step_response
-from mjhill.experiments.paper.step import Step, step
-from mjhill.experiments.trials.step_fit import fitted_step
 from mjhill.lab.variants import AS_IT_IS, FLAT, LINEAR
 from mjhill.simulate.reference import rest_state, simulate
 

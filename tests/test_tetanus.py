@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
-
 from mjhill.experiments.paper.tetanus import tetanus
+
 from mjhill.lab.rig import muscle_torque
 
 

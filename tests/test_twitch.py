@@ -5,8 +5,6 @@ import numpy as np
 import pytest
 from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
-
-import mjhill
 from mjhill.experiments.paper.twitch import twitch
 from mjhill.lab.dynamometry import (
     active_torque,
@@ -15,6 +13,8 @@ from mjhill.lab.dynamometry import (
     stiff_machine,
     stimulated,
 )
+
+import mjhill
 from mjhill.lab.rig import UnmeasuredError, muscle_torque
 
 # --- the dynamometer

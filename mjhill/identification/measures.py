@@ -11,8 +11,8 @@ from types import MappingProxyType
 
 from mjhill.experiments.trials.free_velocity import free_velocity
 from mjhill.experiments.trials.impedance import held_impedance, passive_stiffness, stiffness_slope
-from mjhill.experiments.trials.muscle_twitch import muscle_twitch
 from mjhill.experiments.trials.turn import Turn, turn
+from mjhill.experiments.twitch import muscle_twitch
 from mjhill.joints.joint import Joint
 
 Measure = Callable[..., float]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.draw.bellies import MUSCLE_COLOURS
-from mjhill.experiments.figures.drawing import every
+from mjhill.experiments.drawing import every
 from mjhill.lab.frequency import SecondOrderFrequency, decibel
 
 _Values = NDArray[np.float64]

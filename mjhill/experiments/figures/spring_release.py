@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjhill.draw.bellies import MUSCLE_COLOURS
-from mjhill.experiments.figures.drawing import shades, tidy
+from mjhill.experiments.drawing import shades, tidy
 from mjhill.experiments.result import spoken
 
 if TYPE_CHECKING:
