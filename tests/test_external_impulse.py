@@ -5,17 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from mjhill.experiments.external_impulse import external_impulse, impulse_with_burst
-from mjhill.lab.impulse import Impulse
-from mjhill.lab.linear_elements import (
-    contractile_viscosity,
-    linear_elements,
-    series_stiffness,
-)
 
 import mjhill
+from mjhill.experiments.external_impulse import external_impulse, impulse_with_burst
+from mjhill.lab.impulse import Impulse
 from mjhill.lab.postures import balancing_excitations
 from mjhill.lab.rig import UnmeasuredError
+from mjhill.lab.variants import contractile_viscosity, series_stiffness, with_linear_elements
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +140,9 @@ def test_bad_options_are_refused(options, message):
 
 def test_the_figure_the_film_and_the_numbers_are_there(elbow):
     shares = []
-    result = external_impulse("eye", cocontraction=(0.02, 0.5), duration=0.35, progress=shares.append)
+    result = external_impulse(
+        "eye", cocontraction=(0.02, 0.5), duration=0.35, progress=shares.append
+    )
     assert shares[-1] == 1.0
     assert shares == sorted(shares)
     figure = Figure(figsize=result.size)

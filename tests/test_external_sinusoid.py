@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+
+import mjhill
 from mjhill.experiments.external_sinusoid import (
     Curve,
     Oscillation,
     external_sinusoid,
     frequency_responses,
 )
-
-import mjhill
 from mjhill.lab.rig import UnmeasuredError, build_rig, muscle_torque, net_torque
 
 
@@ -37,7 +37,9 @@ def test_a_spring_and_a_damper_have_the_textbook_response(damping):
     joint = passive_joint(damping)
     band = np.geomspace(0.5, 20.0, 16)
     oscillation = Oscillation("shaken", 0.0, {}, 0.1)
-    (curve,) = frequency_responses(build_rig(joint, exact=True), joint.rest_angle, [oscillation], band)
+    (curve,) = frequency_responses(
+        build_rig(joint, exact=True), joint.rest_angle, [oscillation], band
+    )
     turning = 2 * np.pi * band
     truth = 1 / (joint.stiffness - joint.inertia * turning**2 + 1j * damping * turning)
     np.testing.assert_allclose(curve.gain, np.abs(truth), rtol=0.01)
@@ -80,8 +82,10 @@ def test_at_high_frequency_only_inertia_is_left(elbow):
 def test_half_the_torque_gives_the_same_gain():
     """Small enough to be linear."""
     pair = [
-        external_sinusoid("elbow", bias=(0.1, 0.2), cocontraction=(0.2, 0.5), band=(1.0, 8.0), angle=1.9,
-                          deflection=deflection).bias[0]
+        external_sinusoid(
+            "elbow", bias=(0.1, 0.2), cocontraction=(0.2, 0.5), band=(1.0, 8.0), angle=1.9,
+            deflection=deflection,
+        ).bias[0]
         for deflection in (0.02, 0.01)
     ]  # fmt: skip
     np.testing.assert_allclose(pair[0].gain, pair[1].gain, rtol=0.03)

@@ -5,9 +5,9 @@ from math import radians
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from mjhill.experiments.free_pulse import FreePulse, free_pulse, ratio_at, ratio_over_time
 
 import mjhill
+from mjhill.experiments.free_pulse import FreePulse, free_pulse, ratio_at, ratio_over_time
 from mjhill.lab.postures import resting_angle
 from mjhill.lab.rig import UnmeasuredError
 from mjhill.lab.variants import AS_IT_IS, FAST

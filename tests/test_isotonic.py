@@ -5,6 +5,8 @@ from math import degrees, radians
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+
+import mjhill
 from mjhill.experiments.isotonic import (
     BOTH,
     INERTIA,
@@ -14,8 +16,6 @@ from mjhill.experiments.isotonic import (
     isotonic,
     torque_velocity_curve,
 )
-
-import mjhill
 from mjhill.lab.rig import UnmeasuredError
 
 

@@ -6,17 +6,21 @@ from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.paper.isovelocity import isovelocity
-from mjhill.experiments.trials.torque_velocity import isometric, make_sweep, measure
-from mjhill.lab.dynamometry import stiff_machine
-from mjhill.lab.rig import UnmeasuredError, muscle_torque
-from mjhill.lab.velocity_clamp import (
+from mjhill.experiments.isovelocity import isovelocity
+from mjhill.lab.dynamometer import (
     clamped_path,
-    contractile_force,
-    own_torque,
+    contractile_torque,
+    stiff_machine,
     travel_time,
 )
-from mjhill.muscles.readings import shortening_velocity, steady_stretch, tension
+from mjhill.lab.rig import UnmeasuredError, muscle_torque
+from mjhill.lab.torque_velocity import make_sweep, measure_curve, measure_isometric
+from mjhill.muscles.readings import (
+    contractile_force,
+    shortening_velocity,
+    steady_stretch,
+    tension,
+)
 
 EVEN = replace(MUSCLE, width_short=50.0, width_long=50.0)  # as strong at any angle
 
@@ -24,7 +28,7 @@ EVEN = replace(MUSCLE, width_short=50.0, width_long=50.0)  # as strong at any an
 def curve(muscle, velocities, before=1.0, angles=None):
     joint = make_joint(muscle)
     sweep = make_sweep(joint, "puller", np.array(velocities), angles)
-    return sweep, measure(joint, stiff_machine(joint), sweep, before=before)
+    return sweep, measure_curve(joint, stiff_machine(joint), sweep, before=before)
 
 
 # --- the machine's path and the contractile element
@@ -70,7 +74,7 @@ def test_contractile_force_is_isometric_at_rest_and_nothing_past_the_largest_vel
 
 def test_a_gear_divides_velocity_and_multiplies_force():
     joint = make_joint(gears={"puller": -2.0, "opponent": 1.0})
-    assert own_torque(joint, "puller", 1.0, 0.0, 3.0) == pytest.approx(
+    assert contractile_torque(joint, "puller", 1.0, 0.0, 3.0) == pytest.approx(
         2 * contractile_force(MUSCLE, 1.0, 0.0, 6.0)
     )
 
@@ -104,7 +108,7 @@ def test_a_series_element_carries_more_than_the_contractile_element_while_it_rec
 def test_the_isometric_torque_is_the_muscles_own():
     joint = make_joint()
     sweep = make_sweep(joint, "puller", np.array([1.0]), np.array([-0.5, 0.0, 0.4]))
-    largest, at = isometric(joint, stiff_machine(joint), sweep)
+    largest, at = measure_isometric(joint, stiff_machine(joint), sweep)
     wanted = [muscle_torque(joint, "puller", 1.0, angle) for angle in sweep.angles]
     np.testing.assert_allclose(at, wanted, rtol=5e-3)
     assert largest == pytest.approx(10.0, rel=5e-3)

@@ -7,7 +7,7 @@ from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.paper.lengthening import lengthening
+from mjhill.experiments.lengthening import lengthening
 from mjhill.lab.rig import muscle_torque
 
 EVEN = replace(MUSCLE, width_short=50.0, width_long=50.0)  # as strong at any angle

@@ -5,10 +5,10 @@ from math import pi
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from mjhill.experiments.neural_sinusoid import NeuralSinusoid, neural_sinusoid
 
 import mjhill
 from mjhill.analysis.frequency import octaves
+from mjhill.experiments.neural_sinusoid import NeuralSinusoid, neural_sinusoid
 from mjhill.lab.postures import resting_angle
 from mjhill.simulate.reference import rest_state, simulate
 from mjhill.simulate.signals import constant, sinusoid

@@ -12,9 +12,9 @@ from mjhill.lab.postures import (
     check_ascending,
     held_cocontractions,
     holding_excitations,
-    static_stiffness,
     stable_excitations,
     stablest_angle,
+    static_stiffness,
 )
 from mjhill.lab.rig import UnmeasuredError, angle_series, at_rest, build_rig, net_torque
 
@@ -45,7 +45,9 @@ def test_equal_muscles_get_equal_inputs_in_the_middle():
 
 def test_a_level_too_low_for_the_passive_torque_is_not_held():
     elbow = mjhill.JOINTS["elbow"]
-    with pytest.raises(UnmeasuredError, match="an excitation of 0.02 is too low to hold elbow at 28"):
+    with pytest.raises(
+        UnmeasuredError, match="an excitation of 0.02 is too low to hold elbow at 28"
+    ):
         balancing_excitations(elbow, 0.02, 0.5)
 
 
@@ -70,7 +72,10 @@ def test_muscles_past_their_optimum_make_cocontraction_unstable_and_a_spring_ste
     condition = partial(balancing_excitations, joint, 0.5)
     drift = static_stiffness(joint, condition(0.0), 0.0)
     assert drift < 0
-    with pytest.raises(UnmeasuredError, match="eye drifts away from 0°: .* static stiffness with these excitations is -"):
+    with pytest.raises(
+        UnmeasuredError,
+        match="eye drifts away from 0°: .* static stiffness with these excitations is -",
+    ):
         stable_excitations(joint, condition, 0.0)
     assert stable_excitations(joint, condition, 0.0, support=-1.01 * drift) == condition(0.0)
 

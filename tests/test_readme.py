@@ -13,9 +13,9 @@ import mjhill
 from mjhill.benchmarks import accuracy
 from mjhill.cli import main
 from mjhill.identification.agreement import published_rows
+from mjhill.identification.facts import facts
 from mjhill.identification.free import free_parameters, value_of
 from mjhill.identification.report import brief
-from mjhill.literature.facts import facts
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

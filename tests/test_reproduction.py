@@ -131,7 +131,7 @@ def test_a_changed_experiment_is_run_again_and_what_is_older_not_shown(tmp_path,
 
 
 def test_the_sources_of_an_experiment_reach_down_to_the_equations():
-    names = {path.name for path in sources("mjhill.experiments.paper.twitch")}
+    names = {path.name for path in sources("mjhill.experiments.twitch")}
     assert {"twitch.py", "rig.py", "elements.py", "compiled.py"} <= names
     assert "reproduce.py" not in names
 
@@ -318,7 +318,7 @@ def test_the_catalogue_has_the_joints_it_names_and_each_experiment_once():
     assert len({entry.id for entry in CATALOGUE}) == len(CATALOGUE)
     for part in select(CATALOGUE):
         assert part.joint in mjhill.JOINTS
-        assert part.entry.path == f"mjhill.experiments.paper.{part.entry.id}:{part.entry.id}"
+        assert part.entry.path == f"mjhill.experiments.{part.entry.id}:{part.entry.id}"
 
 
 def test_an_experiment_that_needs_its_own_joints_is_left_out_or_refused_on_others():
@@ -347,7 +347,7 @@ def test_unknown_names_end_in_exit_code_2_and_write_nothing(tmp_path, arguments,
 
 
 def test_the_command_runs_an_experiment_of_the_paper_once(tmp_path):
-    pytest.importorskip("mjhill.experiments.paper.tetanus")
+    pytest.importorskip("mjhill.experiments.tetanus")
     command = ["reproduce", "--only", "tetanus", "--joint", "eye", "--no-video", "-o", "out"]
     first = CliRunner().invoke(main, [*command, "--json"])
     assert first.exit_code == 0, first.stderr

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mjhill.experiments.external_sinusoid import Oscillation, frequency_responses
 
 import mjhill
-from mjhill.lab.dynamometry import runs, stiff_machine
+from mjhill.experiments.external_sinusoid import Oscillation, frequency_responses
+from mjhill.lab.dynamometer import run_paths, stiff_machine
 from mjhill.lab.rig import UnmeasuredError, build_rig
 
 
@@ -26,4 +26,4 @@ def test_a_joint_that_cannot_be_simulated_has_no_frequency_response(wild):
 def test_a_joint_that_cannot_be_simulated_is_not_measured_on_the_dynamometer(wild):
     machine = stiff_machine(mjhill.JOINTS["elbow"])
     with pytest.raises(UnmeasuredError, match="elbow: MuJoCo warned"):
-        runs(wild, machine, np.full(400, 1.0) + np.linspace(0, 1, 400))
+        run_paths(wild, machine, np.full(400, 1.0) + np.linspace(0, 1, 400))

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from mjhill.experiments.spring_release import release, spring_release
 
 import mjhill
+from mjhill.experiments.spring_release import release, spring_release
 from mjhill.lab.postures import balancing_excitations
 from mjhill.lab.rig import UnmeasuredError
 
@@ -84,7 +84,9 @@ def test_claims_follow_from_the_releases(elbow):
 
 def test_a_level_that_is_not_held_is_reported():
     soft = (0.5,)  # less than the wrist's muscles take away
-    result = spring_release("wrist", angle=0.0, cocontraction=(0.02, 0.5), springs=soft, duration=0.3)
+    result = spring_release(
+        "wrist", angle=0.0, cocontraction=(0.02, 0.5), springs=soft, duration=0.3
+    )
     assert [one.cocontraction for one in result.releases] == [0.02]
     assert any("drifts away" in measure.note for measure in result.measures())
     assert list(result.claims())[1].holds is None

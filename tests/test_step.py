@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 
 import mjhill
 from mjhill.analysis.second_order import step_response
-from mjhill.experiments.paper.step import Step, step
-from mjhill.experiments.trials.step_fit import fitted_step
+from mjhill.experiments.step import Step, fitted_step, step
 from mjhill.lab.variants import AS_IT_IS, FLAT, LINEAR
 from mjhill.simulate.reference import rest_state, simulate
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mjhill.analysis.swing import first_swing, second_order_response
-from mjhill.experiments.external_impulse import swing_measures
 from scipy.signal import lsim
 
 from mjhill.analysis.responses import SecondOrder
+from mjhill.analysis.swing import first_swing, second_order_response
+from mjhill.experiments.external_impulse import swing_measures
 
 
 def swung(stiffness, damping, inertia=0.1, width=0.02, duration=2.0):

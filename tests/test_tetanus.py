@@ -6,7 +6,7 @@ import pytest
 from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
 
-from mjhill.experiments.paper.tetanus import tetanus
+from mjhill.experiments.tetanus import tetanus
 from mjhill.lab.rig import muscle_torque
 
 

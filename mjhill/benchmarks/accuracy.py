@@ -57,7 +57,8 @@ def movements() -> Mapping[str, Movement]:
     flexor, extensor = joint.muscles
     most = joint.muscles[flexor].max_isometric_force
     stimulated = {
-        name: replace(muscle, electrical_stimulation=True) for name, muscle in joint.muscles.items()
+        name: replace(muscle, electrical_stimulation=True)
+        for name, muscle in joint.hill_muscles.items()
     }
     both = {flexor: 0.3, extensor: 0.1}
     held = {name: as_signal(level) for name, level in both.items()}

@@ -31,6 +31,7 @@ from mjhill.benchmarks.sweep.trial import at_start, inputs_of, run, use
 from mjhill.engine.checks import check_model
 from mjhill.engine.install import installed
 from mjhill.engine.layout import muscle_names, read_muscle, write_muscle
+from mjhill.muscles import hill_of
 from mjhill.simulate.signals import as_signal, pulse
 
 COUNT = 1000  # sound models, and unsound ones
@@ -179,7 +180,7 @@ def _spoil(kind: str, random: Random, case: Case) -> None:
         mujoco.mj_setConst(model, mujoco.MjData(model))
     elif kind == "stiff":
         for name in muscle_names(model):
-            muscle = read_muscle(model, name)
+            muscle = hill_of(read_muscle(model, name))
             stretch = muscle.series_stretch * log_uniform(random, 1e-4, 0.1)
             write_muscle(model, name, replace(muscle, series_stretch=stretch))
     elif kind == "sign":

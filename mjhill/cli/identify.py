@@ -90,12 +90,12 @@ def _known(joints: tuple[str, ...], parameters: Path | None) -> list[str]:
 
 def _published(names: list[str], parameters: Path | None, files: dict[str, Path]) -> dict[str, Any]:
     from mjhill.identification.agreement import published_rows, step_rows
+    from mjhill.identification.facts import facts
     from mjhill.identification.literature import check_evidence, from_literature
     from mjhill.identification.plots import plot_literature
     from mjhill.identification.report import estimate_rows, fact_rows, markdown
     from mjhill.identification.writing import write_parameters
     from mjhill.joints.reader import read_joints
-    from mjhill.literature.facts import facts
 
     check_evidence(names, parameters)
     results = []

@@ -17,6 +17,7 @@ from mjhill.comparison.native import (
     read_spec,
 )
 from mjhill.engine.layout import address, muscle_names, read_muscle
+from mjhill.muscles import hill_of
 from mjhill.muscles.hill import Hill
 
 _PART = 0.5  # control at which the size dependence of MuJoCo's activation is shown
@@ -59,7 +60,7 @@ def matching(model: str | Path) -> tuple[Match, ...]:
     rows: list[Match] = []
     for name in muscle_names(ours):
         units = _units(ours, name)
-        muscle, other = read_muscle(ours, name), read_native(native, name)
+        muscle, other = hill_of(read_muscle(ours, name)), read_native(native, name)
         rows += _matched(name, muscle, other, _optimum(native, name), units)
         rows += _unmatched(name, muscle, other, units)
     return tuple(rows)

@@ -20,6 +20,7 @@ import numpy as np
 from mjhill.engine.install import without_python_callbacks
 from mjhill.engine.layout import actuator_names, addresses, is_muscle, read_muscle
 from mjhill.joints.reader import JOINTS
+from mjhill.muscles import hill_of
 from mjhill.muscles.hill import Hill
 from mjhill.simulate.load import load, model_path
 
@@ -174,7 +175,7 @@ def converted(
     """
     model, result = compiled(spec), spec.copy()
     muscles: Mapping[str, tuple[Hill, float]] = {
-        name: (read_muscle(model, name), float(model.actuator_length0[at.out]))
+        name: (hill_of(read_muscle(model, name)), float(model.actuator_length0[at.out]))
         for name, at in addresses(model)
     }
     if not muscles:

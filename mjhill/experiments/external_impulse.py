@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from mjhill.analysis.swing import Swing
 from mjhill.draw.bellies import MUSCLE_COLOURS
-from mjhill.experiments.figures.drawing import shades, tidy
+from mjhill.experiments.drawing import shades, tidy
 from mjhill.experiments.result import Claim, Measure, Result, spoken
 from mjhill.joints.joint import Joint
 from mjhill.lab.impulse import Impulse, ImpulseResponse

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from mjhill.analysis.frequency import decibel, octaves, response_at
 from mjhill.draw.bellies import MUSCLE_COLOURS
 from mjhill.engine.install import installed
-from mjhill.experiments.figures.drawing import every, shades, tidy
+from mjhill.experiments.drawing import every, shades, tidy
 from mjhill.experiments.result import Claim, Measure, Result, spoken
 from mjhill.joints.joint import Joint
 from mjhill.lab.batch import CONTROL_AND_TORQUE, check_batch

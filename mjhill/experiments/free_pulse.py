@@ -391,7 +391,7 @@ def _doublings(
 def _torque_share(joint: Joint, muscle: str, recording: Recording, time: float) -> float:
     """Force of a muscle at a time [s], over its isometric force at that moment."""
     at = int(np.searchsorted(recording.time, time))
-    parameters = joint.muscles[muscle]
+    parameters = joint.hill_muscles[muscle]
     length = joint.gears[muscle] * float(recording[f"{joint.name}.angle"][at])
     isometric = isometric_share(parameters, float(recording[f"{muscle}.a"][at]), length)
     force = float(recording[f"{muscle}.force"][at])

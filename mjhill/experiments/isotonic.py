@@ -115,7 +115,7 @@ class Isotonic(Result):
         return float(self.torques[0])
 
     def estimates(self) -> dict[str, _Values]:
-        """Estimates of the contractile element's torque [N·m], by what is subtracted, shape (N,)."""
+        """The contractile element's torque [N·m], by what is subtracted, shape (N,)."""
         names = ("load", "inertial", "viscous", "elastic")
         load, inertial, viscous, elastic = (
             np.array([getattr(point, name) for point in self.points]) for name in names
@@ -284,7 +284,7 @@ def isotonic(
             f"{muscle} moves {joint.name} past {degrees(angle):.0f}° within {duration:g} s with "
             f"only {len(points)} loads; give lighter loads or another angle"
         )
-    curve = torque_velocity_curve(joint.muscles[muscle], joint.gears[muscle] * angle)
+    curve = torque_velocity_curve(joint.hill_muscles[muscle], joint.gears[muscle] * angle)
     return Isotonic(
         joint.name, muscle, start, angle, held, tuple(points), *curve, tuple(missed), recordings
     )
@@ -327,7 +327,7 @@ def _angles(
     if angle is None:
         angle = min(max(strongest_angle(joint, muscle), low + margin), high - margin)
     if start is None:
-        start = angle - sign * _RECOIL * joint.muscles[muscle].series_stretch
+        start = angle - sign * _RECOIL * joint.hill_muscles[muscle].series_stretch
         start = min(max(start, low), high)
     if not (low <= angle <= high and low <= start <= high and sign * (angle - start) > 0):
         raise ValueError(

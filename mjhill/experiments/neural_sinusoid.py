@@ -24,7 +24,7 @@ from mjhill.analysis.frequency import (
     second_order_band,
 )
 from mjhill.draw.bellies import MUSCLE_COLOURS
-from mjhill.experiments.figures.drawing import every
+from mjhill.experiments.drawing import every
 from mjhill.experiments.result import Claim, Measure, Result
 from mjhill.joints.joint import Joint
 from mjhill.lab.batch import joint_angles

@@ -29,8 +29,8 @@ import numpy as np
 
 from mjhill.analysis.swing import Swing, first_swing
 from mjhill.draw.bellies import MUSCLE_COLOURS
+from mjhill.experiments.drawing import shades, tidy
 from mjhill.experiments.external_impulse import strongly_rises, swing_measures
-from mjhill.experiments.figures.drawing import shades, tidy
 from mjhill.experiments.result import Claim, Measure, Result, spoken
 from mjhill.joints.joint import Joint
 from mjhill.lab.postures import (

@@ -7,10 +7,10 @@ from math import degrees
 from typing import Any
 
 from mjhill.identification.agreement import published_rows, step_rows
+from mjhill.identification.facts import Fact
 from mjhill.identification.identified import Identified
 from mjhill.identification.movement import Prediction
 from mjhill.joints.joint import Joint
-from mjhill.literature.facts import Fact
 
 
 def estimate_rows(result: Identified) -> list[dict[str, Any]]:

@@ -14,7 +14,7 @@ from mjhill.engine.layout import NUSER_JNT, parameter_rows, passive_row
 from mjhill.engine.spec import joint_spec
 from mjhill.joints.joint import Joint
 from mjhill.lab.rig import UnmeasuredError
-from mjhill.muscles.readings import steady_stretch
+from mjhill.muscles import steady_states
 
 CONTROL_AND_TORQUE = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 
@@ -158,12 +158,11 @@ def check_batch(batch: mujoco.batch.Batch, joint: Joint) -> None:
 
 
 def _steady_states(joints: Sequence[Joint], start: _Values, excitations: _Values) -> _Values:
-    """States n, a, s of every muscle, steady at its excitation and the joint's start angle."""
+    """States of every muscle, steady at its excitation and the joint's start angle."""
     act = []
     for joint, angle, row in zip(joints, start.tolist(), excitations.tolist(), strict=True):
         states: list[float] = []
         for (name, muscle), u in zip(joint.muscles.items(), row, strict=True):
-            length = joint.gears[name] * angle
-            states += [u, u, length - steady_stretch(muscle, u, length)]
+            states += steady_states(muscle, u, joint.gears[name] * angle)
         act.append(states)
     return np.array(act)

@@ -16,7 +16,7 @@ from mjhill.engine.install import installed, without_python_callbacks
 from mjhill.engine.spec import joint_spec
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import JOINTS
-from mjhill.muscles.readings import steady_stretch, tension
+from mjhill.muscles import steady_tension
 from mjhill.simulate.recording import Recording
 from mjhill.simulate.reference import plant_torque
 from mjhill.simulate.run import record
@@ -251,8 +251,7 @@ def antagonist(joint: Joint, muscle: str) -> str:
 
 def muscle_torque(joint: Joint, muscle: str, excitation: float, angle: float) -> float:
     """Steady torque [N·m] of a muscle at an excitation [-] and a constant angle [rad]."""
-    parameters, length = joint.muscles[muscle], joint.gears[muscle] * angle
-    force = tension(parameters, steady_stretch(parameters, excitation, length))
+    force = steady_tension(joint.muscles[muscle], excitation, joint.gears[muscle] * angle)
     return -joint.gears[muscle] * force
 
 
@@ -268,4 +267,4 @@ def net_torque(joint: Joint, excitations: Mapping[str, float], angle: float) -> 
 def strongest_angle(joint: Joint, muscle: str) -> float:
     """Angle [rad] in the range of motion at which the muscle's isometric force is largest."""
     low, high = joint.range
-    return min(max(joint.muscles[muscle].optimal_length / joint.gears[muscle], low), high)
+    return min(max(joint.hill_muscles[muscle].optimal_length / joint.gears[muscle], low), high)

@@ -38,7 +38,7 @@ def with_flat_torque(joint: Joint, muscle: str, travel: float) -> Joint:
 
     It is the torque after a travel [rad] from the angle of rest in the muscle's direction.
     """
-    own = joint.muscles[muscle]
+    own = joint.hill_muscles[muscle]
     length = joint.gears[muscle] * (joint.rest_angle + direction(joint, muscle) * travel)
     share = active_length_factor(length, own.optimal_length, own.width_short, own.width_long)
     force = share * own.max_isometric_force
@@ -109,7 +109,7 @@ def series_stiffness(muscle: Hill, excitation: float, length: float) -> float:
 
 
 def _changed(joint: Joint, change: Callable[[str, Hill], Hill]) -> Joint:
-    muscles = {name: change(name, muscle) for name, muscle in joint.muscles.items()}
+    muscles = {name: change(name, muscle) for name, muscle in joint.hill_muscles.items()}
     return replace(joint, muscles=muscles)
 
 

@@ -120,7 +120,7 @@ def _balance(joint: Joint, agonist: str) -> float:
         """Torque [N·m] towards the agonist's side, so far from rest [rad]."""
         angle = joint.rest_angle + sign * gone
         total = plant_torque(joint, angle)
-        for name, muscle in joint.muscles.items():
+        for name, muscle in joint.hill_muscles.items():
             share = isometric_share(muscle, float(name == agonist), joint.gears[name] * angle)
             total -= joint.gears[name] * muscle.max_isometric_force * share
         return sign * total

@@ -53,6 +53,29 @@ def steady_states(muscle: Muscle, u: float, length: float) -> list[float]:
     return [float(value) for value in model.ask(model.steady, muscle, u=u, length=length)]
 
 
+def steady_tension(muscle: Muscle, u: float, length: float) -> float:
+    """Tension [N·m or N] of a muscle at rest; arguments as for ``steady_states``."""
+    model = model_of(muscle)
+    states = steady_states(muscle, u, length)
+    context: dict[str, object] = dict(zip(model.state_names, states, strict=False))
+    context |= {"u": u, "length": length, "length_rate": 0.0, "states": states}
+    return float(model.ask(model.tension, muscle, **context))
+
+
+def hill_of(muscle: Muscle) -> hill.Hill:
+    """A muscle, for what needs one of the model ``hill``.
+
+    Raises:
+        ValueError: It is of another model.
+    """
+    if not isinstance(muscle, hill.Hill):
+        raise ValueError(
+            f"a muscle of the model {model_of(muscle).name!r} was given, and this needs one of the "
+            "model 'hill'"
+        )
+    return muscle
+
+
 def convert(muscle: Muscle, name: str) -> Muscle:
     """A muscle as one of another model.
 

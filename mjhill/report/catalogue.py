@@ -9,7 +9,6 @@ from typing import Any
 
 from mjhill.joints.reader import JOINTS
 
-_PAPER = ("synergists", "twitch", "tetanus", "isovelocity", "step", "lengthening")
 _TABLE_2 = ("elbow", "wrist", "wrist_rotation", "knee", "ankle", "head", "eye")
 
 
@@ -68,8 +67,7 @@ class Part:
 
 
 def _entry(name: str, *joints: str, filmed: bool = False, anywhere: bool = True) -> Entry:
-    folder = "experiments.paper" if name in _PAPER else "experiments"
-    return Entry(name, f"mjhill.{folder}.{name}:{name}", joints, filmed, anywhere)
+    return Entry(name, f"mjhill.experiments.{name}:{name}", joints, filmed, anywhere)
 
 
 CATALOGUE = (

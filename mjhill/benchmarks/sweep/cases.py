@@ -171,7 +171,7 @@ def _several(kind: str, number: int, random: _Random) -> Case:
     for extra in range(int(random.integers(1, 4) if len(joints) == 1 else random.integers(2))):
         joint = joints[0]
         pulls = float(random.choice([-1.0, 1.0]))
-        part = _varied_muscle(random, list(joint.muscles.values())[0 if pulls < 0 else 1])
+        part = _varied_muscle(random, list(joint.hill_muscles.values())[0 if pulls < 0 else 1])
         share = _log(random, 0.2, 0.8)
         muscles[f"x{extra}"] = replace(part, max_isometric_force=share * part.max_isometric_force)
         arms[f"x{extra}"] = {name: pulls * _log(random, 0.6, 1.2) for name in coordinates}
@@ -182,7 +182,7 @@ def _several(kind: str, number: int, random: _Random) -> Case:
 def _stretch(kind: str, number: int, random: _Random) -> Case:
     """One muscle on a hinge that is stretched and let go, sinusoidally or in ramps."""
     joint = _varied_joint(random)
-    name, muscle = list(joint.muscles.items())[int(random.integers(2))]
+    name, muscle = list(joint.hill_muscles.items())[int(random.integers(2))]
     peak = muscle.max_velocity * float(random.uniform(0.3, 1.0))
     frequency = _log(random, 3, 12)
     phase = float(random.choice([0.0, math.pi]))
@@ -299,7 +299,7 @@ def _varied_joint(random: _Random, name: str | None = None) -> Joint:
         inertia=joint.inertia * _log(random, 0.7, 3),
         damping=joint.damping * _log(random, 0.3, 2),
         stiffness=joint.stiffness * _log(random, 0.5, 2),
-        muscles={key: _varied_muscle(random, muscle) for key, muscle in joint.muscles.items()},
+        muscles={key: _varied_muscle(random, muscle) for key, muscle in joint.hill_muscles.items()},
     )
 
 

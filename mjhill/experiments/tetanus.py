@@ -1,4 +1,4 @@
-"""Tetanus: lasting full input to an isometric muscle (sect. 4.1.2, Fig. 5b, Table 1)."""
+"""Tetanus: lasting full excitation of an isometric muscle (sect. 4.1.2, Fig. 5b, Table 1)."""
 
 from __future__ import annotations
 
@@ -12,22 +12,20 @@ from numpy.typing import NDArray
 
 from mjhill.analysis.second_order import SecondOrderStep, fit_step, step_response
 from mjhill.draw.bellies import MUSCLE_COLOURS
-from mjhill.experiments.figures.drawing import legend_above, tidy
+from mjhill.experiments.drawing import legend_above, tidy
 from mjhill.experiments.result import Claim, Measure, Result, spoken
 from mjhill.joints.joint import Joint
-from mjhill.lab.dynamometry import active_torque, stiff_machine, stimulated
+from mjhill.lab.dynamometer import active_torque, electrically_stimulated, stiff_machine
 from mjhill.lab.rig import as_joint, build_rig
 
 _DURATION = 2.0  # [s]; ten times the slowest rise
-_ANGLES = 15  # at which the largest torque is sought, ends of the range of motion included
-_SETTLED = 0.01  # distance from the steady level, as a share of it, that ends the rise [-]
-_LIKE = (
-    0.05  # root mean square misfit up to which a response is like that of a second-order system [-]
-)
-_OVERSHOOT = 0.01  # past which a response is not overdamped [-]
-_TOLD_APART = 2e-3  # [s]; two samples
-_OFF = radians(5.0)  # distance from the optimum that counts as off it
-_BELOW = 0.01  # of the largest torque: what counts as below it
+_ANGLES = 15  # over the range of motion, its ends included, to find the largest torque
+_SETTLED = 0.01  # the rise ends at this distance from the steady torque, as a share of it [-]
+_MISFIT = 0.05  # RMS misfit up to which a response is like that of a second-order system [-]
+_OVERSHOOT = 0.01  # overshoot up to which a response is overdamped [-]
+_DISTINCT = 2e-3  # two times differ if they are farther apart [s]; two samples
+_OFF = radians(5.0)  # an angle farther from the best is not the best
+_BELOW = 0.01  # of the largest torque: a torque that is lower by more is below it
 
 
 @dataclass(frozen=True)
@@ -35,10 +33,10 @@ class Contraction:
     """A maximal isometric contraction at mid-range.
 
     Attributes:
-        torque: Active torque, of the largest over all angles, at ``Tetanus.time`` [-], shape (T,).
-        fit: The overdamped second-order step response nearest to its rise.
-        deviation: Largest distance between the two, of the steady level [-].
-        rise: Time to 63 % of the steady level [s].
+        torque: Active torque over the largest at any angle, at ``Tetanus.time`` [-], shape (T,).
+        fit: The overdamped second-order step response that is closest to its rise.
+        deviation: Largest distance between the two, as a share of the steady torque [-].
+        rise: Time to 63 % of the steady torque [s].
     """
 
     torque: NDArray[np.float64]
@@ -47,14 +45,14 @@ class Contraction:
     rise: float
 
     @property
-    def level(self) -> float:
-        """Steady torque, of the largest over all angles [-]."""
+    def steady(self) -> float:
+        """Steady torque over the largest at any angle [-]."""
         return float(self.torque[-1])
 
     @property
     def overshoot(self) -> float:
-        """How far it goes past its steady level, as a share of it [-]."""
-        return max(0.0, float(self.torque.max()) / self.level - 1.0)
+        """How far torque exceeds its steady value, as a share of it [-]."""
+        return max(0.0, float(self.torque.max()) / self.steady - 1.0)
 
 
 @dataclass(frozen=True)
@@ -64,12 +62,12 @@ class Tetanus(Result):
     Attributes:
         joint: Name of the joint.
         angle: Mid-range [rad].
-        time: From the start of the input [s], shape (T,).
-        voluntary: By muscle, under neural input.
-        electrical: By muscle, under electrical stimulation, which bypasses neural excitation.
+        time: Time from the start of the excitation [s], shape (T,).
+        voluntary: Contraction under neural excitation, by muscle.
+        electrical: Contraction under electrical stimulation, which bypasses neural excitation.
         largest: Largest active torque over the range of motion, by muscle [N·m].
-        best: Angle of that, by muscle [rad].
-        stiffness: Of the dynamometer [N·m/rad].
+        best: Angle of that torque, by muscle [rad].
+        stiffness: Stiffness of the dynamometer [N·m/rad].
     """
 
     title: ClassVar[str] = "Isometric tetanus"
@@ -84,7 +82,7 @@ class Tetanus(Result):
     stiffness: float
 
     def measures(self) -> Iterator[Measure]:
-        """What Table 1 lists, whose numbers the scan of the paper lacks."""
+        """The quantities of Table 1; its numbers are not in the scan of the paper."""
         for muscle in self.voluntary:
             kinds = (("", self.voluntary[muscle]), (", electrical", self.electrical[muscle]))
             for kind, found in kinds:
@@ -93,21 +91,21 @@ class Tetanus(Result):
                 yield Measure(f"{muscle}{kind}, T2", 1e3 * fast, "ms", note=_damping(slow, fast))
                 yield Measure(f"{muscle}{kind}, rise to 63 %", 1e3 * found.rise, "ms")
                 yield Measure(f"{muscle}{kind}, misfit of T1 and T2", 1e2 * found.fit.misfit, "%")
-            level = self.voluntary[muscle].level
-            yield Measure(f"{muscle}, steady level", level, "-", note="of the largest torque")
+            steady = self.voluntary[muscle].steady
+            yield Measure(f"{muscle}, steady torque", steady, "-", note="of the largest torque")
             note = f"at {round(degrees(self.best[muscle]))}°"
             yield Measure(f"{muscle}, largest torque", self.largest[muscle], "N·m", note=note)
         yield Measure("mid-range", degrees(self.angle), "°")
         yield Measure("stiffness of the dynamometer", self.stiffness, "N·m/rad")
 
     def claims(self) -> Iterator[Claim]:
-        """Second-order-like, faster when stimulated, below 1 off the optimum."""
+        """Like a second-order system, faster when stimulated, below the largest at mid-range."""
         pairs = {m: (self.voluntary[m], self.electrical[m]) for m in self.voluntary}
         yield Claim(
             "The rise of torque is like the step response of an overdamped second-order system.",
             "4.1.2, Fig. 5b, Table 1",
             all(
-                one.fit.misfit <= _LIKE and one.overshoot <= _OVERSHOOT
+                one.fit.misfit <= _MISFIT and one.overshoot <= _OVERSHOOT
                 for one in self.voluntary.values()
             ),
             "; ".join(
@@ -120,20 +118,20 @@ class Tetanus(Result):
         yield Claim(
             "Under electrical stimulation, which bypasses neural excitation, it responds faster.",
             "4.1.2",
-            all(one.rise - other.rise > _TOLD_APART for one, other in pairs.values()),
+            all(one.rise - other.rise > _DISTINCT for one, other in pairs.values()),
             "; ".join(
                 f"{muscle}: 63 % after {1e3 * other.rise:.0f} instead of {1e3 * one.rise:.0f} ms"
                 for muscle, (one, other) in pairs.items()
             ),
         )
-        yield self._below_one()
+        yield self._below_largest()
 
-    def _below_one(self) -> Claim:
-        """Whether the level is clearly below 1 where mid-range is not the optimum."""
+    def _below_largest(self) -> Claim:
+        """Whether torque at mid-range is clearly below the largest, where that is elsewhere."""
         off = {m: abs(self.angle - best) > _OFF for m, best in self.best.items()}
-        low = {m: self.voluntary[m].level < 1.0 - _BELOW for m in self.voluntary}
+        low = {m: self.voluntary[m].steady < 1.0 - _BELOW for m in self.voluntary}
         evidence = "; ".join(
-            f"{muscle}: {found.level:.3f} at {round(degrees(self.angle))}°, largest at "
+            f"{muscle}: {found.steady:.3f} at {round(degrees(self.angle))}°, largest at "
             f"{round(degrees(self.best[muscle]))}°"
             for muscle, found in self.voluntary.items()
         )
@@ -179,11 +177,11 @@ def tetanus(
 ) -> Tetanus:
     """Maximal isometric contractions of each muscle of a joint, one at a time, at mid-range.
 
-    On a dynamometer; torque is the gauge's reading above that of the relaxed joint, as a share of
-    the largest of 15 angles over the range of motion and mid-range.
+    On a dynamometer. Torque is the gauge's reading above that of the relaxed joint, as a share of
+    the largest at 15 angles over the range of motion.
 
     Args:
-        joint: The joint, or the name of one.
+        joint: The joint or its name.
         progress: Called with the share done, 0 to 1.
 
     Raises:
@@ -195,12 +193,13 @@ def tetanus(
     middle = _ANGLES // 2
     steps = round(_DURATION / build_rig(subject).timestep)
     path = np.repeat(grid[:, np.newaxis], steps, axis=1)
+    stimulated = electrically_stimulated(subject)
     voluntary, electrical, largest, best = {}, {}, {}, {}
     for count, muscle in enumerate(subject.muscles, 1):
         runs, torque = active_torque(subject, machine, path, muscle)
         strongest = int(torque[:, -1].argmax())
         largest[muscle], best[muscle] = float(torque[strongest, -1]), float(grid[strongest])
-        _, faster = active_torque(stimulated(subject), machine, path[middle], muscle)
+        _, faster = active_torque(stimulated, machine, path[middle], muscle)
         voluntary[muscle] = _contraction(runs.time, torque[middle] / largest[muscle])
         electrical[muscle] = _contraction(runs.time, faster[0] / largest[muscle])
         if progress:
@@ -214,7 +213,7 @@ def tetanus(
 def _contraction(time: NDArray[np.float64], torque: NDArray[np.float64]) -> Contraction:
     end = float(torque[-1])
     risen = torque >= (1.0 - exp(-1.0)) * end
-    # the fit is to the rise: a long steady part would hide how it misses
+    # the fit is to the rise only: over a long steady part its misfit would look small
     settled = int(np.flatnonzero(np.abs(torque - end) > _SETTLED * end)[-1])
     window = slice(0, min(round(1.5 * settled), len(time)))
     fit = fit_step(time[window], torque[window])
@@ -224,4 +223,6 @@ def _contraction(time: NDArray[np.float64], torque: NDArray[np.float64]) -> Cont
 
 
 def _damping(slow: float, fast: float) -> str:
-    return "equal to T1: critically damped, as near as it can be" if slow < 1.01 * fast else ""
+    return (
+        "equal to T1: as close to critical damping as the fit allows" if slow < 1.01 * fast else ""
+    )

@@ -1,10 +1,11 @@
-"""The fastest turn to a new angle: a saccade of the eye, its like of the head.
+"""Fast movements: the fastest ballistic movement to a new angle, and the free velocity.
 
-The neural input of a fast voluntary movement is near a pulse of maximal height, 30 to 200 ms long,
-and bursts that clamp the joint where it is to stay (Winters & Stark 1987, sect. 4.2.1). Here the
-agonist is fully on for a pulse, in heavier joints the antagonist then brakes fully for a second
-one, and after that the level that holds the new angle follows at once. The movement is symmetric
-about the angle of rest, from one held angle to the other, the antagonist of each muscle off.
+The excitation of a fast voluntary movement is near a pulse of maximal height, 30 to 200 ms long,
+and bursts that clamp the joint at its new angle (Winters & Stark 1987, sect. 4.2.1); a saccade is
+one. Here the agonist is fully excited for a pulse. In heavier joints the antagonist then brakes
+fully for a second pulse. After that the excitation that holds the new angle follows at once. The
+movement is symmetric about the angle of rest, from one held angle to the other, the antagonist of
+each muscle off.
 """
 
 from __future__ import annotations
@@ -35,18 +36,19 @@ from mjhill.lab.rig import (
 from mjhill.simulate.recording import Recording
 from mjhill.simulate.signals import Signal
 
-_FALL_BACK = 0.05  # most that a braked turn may come back after its peak, of the amplitude
+_FALL_BACK = 0.05  # of the amplitude: a braked movement comes back by no more after its peak
+_FREE_TIME = 1.0  # [s]; the slowest joint has crossed its range by then
 _PULSE_ERROR, _SEARCH_ERROR = 1e-6, 2e-4  # of a pulse's width [s]
 
 
 @dataclass(frozen=True)
-class Turn:
-    """A turn that goes its amplitude and no farther.
+class BallisticMovement:
+    """A movement that goes its amplitude and no farther.
 
     Attributes:
         pulse: How long the agonist is fully on [s].
         brake: How long the antagonist is fully on after that [s].
-        velocity: Along the turn, at ``time`` [rad/s], shape (T,).
+        velocity: Along the movement, at the times of ``run`` [rad/s], shape (T,).
         progress: Angle from the start, in units of the amplitude [-], shape (T,).
         run: The recording.
     """
@@ -80,9 +82,9 @@ class Turn:
 
 @dataclass(frozen=True)
 class _Task:
-    """From a held start, along a direction, by an amplitude [rad] in a duration [s]."""
+    """A movement to be found: from a held start, by an amplitude [rad], within a duration [s]."""
 
-    bench: Rig
+    rig: Rig
     agonist: str
     antagonist: str
     start: mujoco.MjData
@@ -90,9 +92,9 @@ class _Task:
     duration: float
     hold: dict[str, float]
 
-    def inputs(self, pulse: float, brake: float) -> dict[str, Signal]:
-        """Input of each muscle; a pulse that ends inside a step ends in a level in between."""
-        step, hold = self.bench.timestep, self.hold
+    def excitations(self, pulse: float, brake: float) -> dict[str, Signal]:
+        """Excitation of each muscle; within a step, the mean of a pulse that ends there."""
+        step, hold = self.rig.timestep, self.hold
 
         def share(time: float, end: float) -> float:
             return min(max((end - time) / step + 0.5, 0.0), 1.0)
@@ -109,65 +111,67 @@ class _Task:
 
     def progress(self, angle: NDArray[np.float64]) -> NDArray[np.float64]:
         """Angle from the start in units of the amplitude [-]."""
-        along = direction(self.bench.joint, self.agonist)
+        along = direction(self.rig.joint, self.agonist)
         return np.asarray(along * (angle - angle[0]) / self.amplitude)
 
     def trial(self, pulse: float, brake: float) -> NDArray[np.float64]:
         """Progress at every step."""
-        inputs = self.inputs(pulse, brake)
-        return self.progress(angle_series(self.bench, self.start, self.duration, inputs))
+        excitations = self.excitations(pulse, brake)
+        return self.progress(angle_series(self.rig, self.start, self.duration, excitations))
 
     def excess(self, pulse: float, brake: float) -> float:
-        """How far the turn goes past its amplitude, negative where it falls short [-]."""
+        """How far the movement passes its amplitude, negative where it falls short [-]."""
         return float(self.trial(pulse, brake).max()) - 1.0
 
     def fall_back(self, pulse: float, brake: float) -> float:
-        """How far the turn comes back after its peak [-]."""
+        """How far the movement comes back after its peak [-]."""
         progress = self.trial(pulse, brake)
         return float(progress.max() - progress[progress.argmax() :].min())
 
 
-def turn(
+def ballistic_movement(
     joint: Joint, muscle: str, *, amplitude: float, duration: float, braked: bool = False
-) -> Turn:
-    """The fastest turn by ``amplitude`` [rad] that ``muscle`` makes.
+) -> BallisticMovement:
+    """The fastest movement by ``amplitude`` [rad] that ``muscle`` makes.
 
-    Without a brake, the pulse is as wide as takes the joint to the new angle and not past it:
-    pulse and hold match. With one, the pulse is the widest whose brake stops the joint at the
-    new angle from where it comes back by no more than 5 % of the amplitude.
+    Without a brake, the pulse is just wide enough to reach the new angle and not pass it. With a
+    brake, the pulse is the widest for which the brake stops the joint at the new angle and the
+    joint then comes back by no more than 5 % of the amplitude.
 
     Args:
         joint: The joint.
         muscle: The agonist.
-        amplitude: How far it turns [rad].
-        duration: By when it is to be there, and the length of the run [s].
+        amplitude: How far the joint moves [rad].
+        duration: Length of the run, within which it must arrive [s].
         braked: Whether the antagonist brakes.
 
     Raises:
-        UnmeasuredError: The joint cannot make such a turn.
+        UnmeasuredError: The joint cannot make such a movement.
     """
-    bench = build_rig(joint)
+    rig = build_rig(joint)
     first, last = _ends(joint, muscle, amplitude)
-    start = at_rest(bench, first, holding_excitations(joint, muscle, first))
+    start = at_rest(rig, first, holding_excitations(joint, muscle, first))
     hold = holding_excitations(joint, muscle, last)
     other = antagonist(joint, muscle)
-    task = _Task(bench, muscle, other, start, amplitude, duration, hold)
+    task = _Task(rig, muscle, other, start, amplitude, duration, hold)
     if task.excess(duration, 0.0) < 0:
         raise UnmeasuredError(
-            f"full input does not turn it by {degrees(amplitude):g}° in {duration:g} s"
+            f"full excitation does not move it by {degrees(amplitude):g}° in {duration:g} s"
         )
     pulse, brake = _braked(task) if braked else (_unbraked(task), 0.0)
-    recording = record_run(bench, start, duration, excitation=task.inputs(pulse, brake))
+    recording = record_run(rig, start, duration, excitation=task.excitations(pulse, brake))
     velocity = direction(joint, muscle) * recording[f"{joint.name}.velocity"]
-    return Turn(pulse, brake, velocity, task.progress(recording[f"{joint.name}.angle"]), recording)
+    return BallisticMovement(
+        pulse, brake, velocity, task.progress(recording[f"{joint.name}.angle"]), recording
+    )
 
 
 def _ends(joint: Joint, muscle: str, amplitude: float) -> tuple[float, float]:
-    """Start and end [rad] of a turn about the angle of rest, moved into the range of motion."""
+    """Start and end [rad] of a movement about the angle of rest, shifted into the range."""
     low, high = joint.range
     if amplitude > high - low:
         raise UnmeasuredError(
-            f"a turn of {degrees(amplitude):g}° is wider than the range of {joint.name}, "
+            f"a movement of {degrees(amplitude):g}° is wider than the range of {joint.name}, "
             f"{degrees(high - low):g}°"
         )
     half = 0.5 * amplitude
@@ -183,7 +187,7 @@ def _unbraked(task: _Task) -> float:
 
 
 def _braked(task: _Task) -> tuple[float, float]:
-    """Widths of pulse and brake [s]: the wider the pulse, the harder the brake, the more falls."""
+    """Widths of pulse and brake [s]; a wider pulse needs a longer brake and comes back further."""
     long = task.duration
     narrow = 0.0 if task.excess(0.0, 0.0) > 0 else _unbraked(task)
     wide = _root(lambda pulse: task.excess(pulse, long), narrow, long, _PULSE_ERROR)
@@ -199,10 +203,30 @@ def _braked(task: _Task) -> tuple[float, float]:
 
 
 def _root(function: Callable[[float], float], low: float, high: float, error: float) -> float:
-    """Where a function that rises from below 0 to above passes 0, or the end that it is past."""
-    known = cache(function)  # brentq asks again for both ends
+    """Where a rising function passes 0; an end of the interval if it does not inside."""
+    known = cache(function)  # brentq evaluates both ends again
     if known(low) >= 0:
         return low
     if known(high) <= 0:
         return high
     return float(brentq(known, low, high, xtol=error))
+
+
+def free_velocity(joint: Joint, muscle: str) -> float:
+    """Peak velocity [rad/s] at full excitation, from the far end of the range of motion.
+
+    The joint starts still, both muscles relaxed. Past the other end, where ligaments and bone
+    would stop it, its velocity does not count.
+
+    Raises:
+        UnmeasuredError: The muscle does not move it.
+    """
+    along, (low, high) = direction(joint, muscle), joint.range
+    rig = build_rig(joint)
+    start = at_rest(rig, low if along > 0 else high)
+    recording = record_run(rig, start, _FREE_TIME, excitation={muscle: 1.0})
+    angle, velocity = recording[f"{joint.name}.angle"], along * recording[f"{joint.name}.velocity"]
+    peak = float(velocity[(angle >= low) & (angle <= high)].max())
+    if peak <= 0:
+        raise UnmeasuredError(f"{muscle} does not move it from the far end of its range")
+    return peak
