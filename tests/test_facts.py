@@ -75,7 +75,7 @@ def test_a_joint_stays_where_it_is_held(angle):
 
 
 def test_a_joint_too_stiff_for_its_muscle_is_not_held():
-    with pytest.raises(UnmeasuredError, match="full input of puller does not hold joint"):
+    with pytest.raises(UnmeasuredError, match="full excitation of puller does not hold joint"):
         holding_excitations(make_joint(stiffness=100.0), "puller", 0.5)
 
 
@@ -127,7 +127,7 @@ def test_a_movement_that_swings_past_without_a_pulse_needs_a_brake():
 def test_a_turn_wider_than_the_range_or_too_far_for_its_time_is_not_measured():
     with pytest.raises(UnmeasuredError, match="wider than the range"):
         movement_of(make_joint(), 150, False)
-    with pytest.raises(UnmeasuredError, match="does not turn it by 60° in 0.02 s"):
+    with pytest.raises(UnmeasuredError, match="does not move it by 60° in 0.02 s"):
         ballistic_movement(make_joint(), "puller", amplitude=radians(60), duration=0.02)
 
 
@@ -146,7 +146,7 @@ def test_a_twitch_peaks_later_and_relaxes_more_slowly_with_larger_time_constants
 
 def test_a_twitch_is_isometric_at_the_angle_of_the_largest_force():
     joint = make_joint(replace(MUSCLE, optimal_length=0.3))
-    angle = muscle_twitch(joint, "puller").run["joint.angle"]
+    angle = muscle_twitch(joint, "puller").recording["joint.angle"]
     assert angle[0] == pytest.approx(-0.3)
     assert np.ptp(angle) < radians(0.2)  # what the dynamometer gives way
     assert strongest_angle(make_joint(range=(-0.1, 1.0)), "puller") == 0.0
@@ -279,7 +279,7 @@ def test_what_cannot_be_measured_is_reported_with_its_reason():
     for fact in facts({"eye": stuck}):
         assert fact.measured is None
         assert fact.within is None
-        assert "full input of medial_rectus does not hold eye" in fact.note
+        assert "full excitation of medial_rectus does not hold eye" in fact.note
 
 
 def test_names_that_do_not_exist_are_refused_with_those_that_do(tmp_path):

@@ -89,19 +89,19 @@ def test_a_contracted_muscle_as_strong_at_any_angle_gives_hills_curve():
     for k, velocity in enumerate(velocities):
         hill = contractile_force(EVEN, 1.0, 0.0, velocity)
         assert found.at[-1, k] == pytest.approx(hill, rel=0.01)
-        assert found.own[-1, k] == pytest.approx(hill, rel=0.01)
+        assert found.contractile[-1, k] == pytest.approx(hill, rel=0.01)
 
 
 def test_a_muscle_with_hardly_any_series_element_gives_the_contractile_elements_own():
     quick = replace(MUSCLE, series_stretch=0.004)
     for before in (0.0, 1.0):
         _, found = curve(quick, [0.5, 1.0, 2.0, 4.0, -1.0], before)
-        np.testing.assert_allclose(found.at, found.own, atol=0.01 * 10.0)
+        np.testing.assert_allclose(found.at, found.contractile, atol=0.01 * 10.0)
 
 
 def test_a_series_element_carries_more_than_the_contractile_element_while_it_recoils():
     _, found = curve(replace(EVEN, series_stretch=0.5), [10.0])
-    above = (found.at - found.own)[:, 0]
+    above = (found.at - found.contractile)[:, 0]
     assert above[0] > above[1] > above[2] > 0
 
 
@@ -133,7 +133,7 @@ def test_without_a_series_element_to_remove_there_is_nothing_to_explain():
     claims = {claim.sentence[:12]: claim.holds for claim in found.claims()}
     assert claims["The series e"] is None
     assert claims["The curves d"] is False
-    assert found.curves.bare > 0.02  # the steps allow no less
+    assert found.curves.rigid > 0.02  # the steps allow no less
     with pytest.raises(UnmeasuredError, match="so stiff a series element"):
         isovelocity(replace(quick, inertia=0.005), velocities=[1.0])
 

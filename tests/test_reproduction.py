@@ -174,16 +174,17 @@ sys.exit(outcome.exit_code)
 
 def ended(folder, number, whole_group):
     """Exit code and words of a run that gets a signal while a part is at work in a process."""
+    at_work = folder.with_name(f"{folder.name}.at_work")
     process = subprocess.Popen(
         [sys.executable, "-c", INTERRUPTED, str(folder)],
-        env={**os.environ, "PYTHONPATH": f"{TESTS}:{TESTS.parent}"},
+        env={**os.environ, "PYTHONPATH": f"{TESTS}:{TESTS.parent}", "AT_WORK": str(at_work)},
         start_new_session=True,  # a group of its own, to which Ctrl-C goes as in a terminal
         stderr=subprocess.PIPE,
         text=True,
     )
     try:
         until = time.monotonic() + 60
-        while not list(folder.glob(".endless*")):
+        while not at_work.exists():
             assert time.monotonic() < until
             assert process.poll() is None
             time.sleep(0.05)
