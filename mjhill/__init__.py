@@ -1,5 +1,6 @@
 """Physiological muscle for MuJoCo: the Hill-based system of Winters & Stark (1987)."""
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from mjhill.engine.checks import check_model as check_model
@@ -45,19 +46,45 @@ from mjhill.simulate.transients import Transient as Transient
 from mjhill.simulate.transients import transients as transients
 
 if TYPE_CHECKING:
+    from mjhill import experiments as experiments
+    from mjhill.comparison import compare as compare
     from mjhill.draw import View as View
     from mjhill.draw import draw_muscles as draw_muscles
+    from mjhill.draw import frames as frames
     from mjhill.draw import render as render
     from mjhill.draw import snapshot as snapshot
     from mjhill.draw import view as view
+    from mjhill.draw.plot import plot_recording
+    from mjhill.identification import identify as identify
+
+    plot = plot_recording
 
 __version__ = "0.1.0"
 
+# loaded when they are asked for, because ``import mujoco`` loads this package: module and name
+_LATER = {
+    "View": ("mjhill.draw", "View"),
+    "compare": ("mjhill.comparison", "compare"),
+    "draw_muscles": ("mjhill.draw", "draw_muscles"),
+    "experiments": ("mjhill.experiments", ""),
+    "frames": ("mjhill.draw", "frames"),
+    "identify": ("mjhill.identification", "identify"),
+    "plot": ("mjhill.draw.plot", "plot_recording"),
+    "render": ("mjhill.draw", "render"),
+    "snapshot": ("mjhill.draw", "snapshot"),
+    "view": ("mjhill.draw", "view"),
+}
+
 
 def __getattr__(name: str) -> Any:
-    """What draws is loaded when it is asked for: ``import mujoco`` loads this package too."""
-    if name in ("View", "draw_muscles", "render", "snapshot", "view"):
-        from mjhill import draw as rendering
-
-        return getattr(rendering, name)
+    """What draws, experiments and fits, loaded at its first use."""
+    if name in _LATER:
+        module, attribute = _LATER[name]
+        loaded = import_module(module)
+        return getattr(loaded, attribute) if attribute else loaded
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """All public names, those too that are loaded later."""
+    return sorted({*globals(), *_LATER})

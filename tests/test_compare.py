@@ -10,7 +10,8 @@ import pytest
 
 import mjhill
 from mjhill.analysis import responses
-from mjhill.comparison import Comparison, compare, step_cost, trials, write
+from mjhill.comparison import Comparison, compare, step_cost, write
+from mjhill.comparison import table as trials
 from mjhill.comparison.cost import bare_spec
 from mjhill.comparison.native import read_spec
 

@@ -12,9 +12,9 @@ from click.testing import CliRunner
 import mjhill
 from mjhill.benchmarks import accuracy
 from mjhill.cli import main
-from mjhill.identification.agreement import published_rows
 from mjhill.identification.facts import facts
-from mjhill.identification.free import free_parameters, value_of
+from mjhill.identification.fit import free_parameters, value_of
+from mjhill.identification.literature_fit import published_rows
 from mjhill.identification.report import brief
 
 ROOT = Path(__file__).parent.parent

@@ -17,11 +17,10 @@ from small_experiments import HOSTILE, entry
 
 import mjhill
 from mjhill.cli import main
-from mjhill.report import CATALOGUE, Entry, report_of, reproduce, select, write_report
-from mjhill.report.fingerprint import sources
+from mjhill.report import CATALOGUE, Entry, fingerprint, report_of, reproduce, select, write_report
+from mjhill.report.page import difference, duration, number, published
 from mjhill.report.part import film_speed
 from mjhill.report.process import uninterrupted
-from mjhill.report.words import difference, duration, number, published
 
 TESTS = Path(__file__).parent
 
@@ -130,10 +129,18 @@ def test_a_changed_experiment_is_run_again_and_what_is_older_not_shown(tmp_path,
     assert outcome.parts[0][1]["options"]["level"] == 0.4
 
 
-def test_the_sources_of_an_experiment_reach_down_to_the_equations():
-    names = {path.name for path in sources("mjhill.experiments.twitch")}
-    assert {"twitch.py", "rig.py", "elements.py", "compiled.py"} <= names
-    assert "reproduce.py" not in names
+def test_any_source_or_data_file_of_the_package_counts(tmp_path, monkeypatch):
+    shutil.copytree(TESTS.parent / "mjhill", tmp_path / "mjhill")
+    monkeypatch.setattr(fingerprint, "_PACKAGE", tmp_path / "mjhill")
+    words = []
+    for changed in (None, "elements.py", "engine/compiled.py", "literature/facts.toml"):
+        if changed is not None:
+            with open(tmp_path / "mjhill" / changed, "a", encoding="utf-8") as file:
+                file.write("\n")
+        fingerprint._own.cache_clear()
+        words.append(fingerprint.fingerprint("mjhill.experiments.twitch"))
+    fingerprint._own.cache_clear()
+    assert len(set(words)) == len(words)
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,12 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.draw.bellies import DrawnMuscle, drawn_muscles
-from mjhill.draw.curves import make_plots
 from mjhill.draw.dashboard import Reading, make_dashboard
 from mjhill.draw.panels import arrange
-from mjhill.draw.poses import Poses, rest_pose
-from mjhill.draw.stage import Stage, stage
-from mjhill.draw.timeplot import Side
+from mjhill.draw.stage import Poses, Stage, rest_pose, stage
+from mjhill.draw.timeplot import Side, make_plots
 from mjhill.draw.video import SUFFIXES, video_writer
 from mjhill.files import check_writable, replacing
 from mjhill.simulate.recording import Recording
@@ -93,28 +91,83 @@ def render(
         OSError: ``path`` cannot be written.
         RuntimeError: There is no OpenGL to render with, or no encoder.
     """
-    path, views = Path(path), [views] if isinstance(views, View) else list(views)
-    _check_film(views, path, fps, speed)
-    _check_size(size, even=True)
+    path, views = Path(path), _listed(views)
+    _check_film(views, fps, speed, size)
+    if path.suffix not in SUFFIXES:
+        raise ValueError(f"video {str(path)!r} must end in {' or '.join(SUFFIXES)}")
+    check_writable(path)
+    with replacing(path) as partial, ExitStack() as stack:
+        film = stack.enter_context(closing(_frames(views, fps, size, speed, camera)))
+        append = stack.enter_context(video_writer(partial, size, fps))
+        count = len(_times(views, fps, speed))
+        for done, frame in enumerate(film, 1):
+            append(frame)
+            if progress is not None:
+                progress(done, count)
+    return path
+
+
+def frames(
+    views: View | Sequence[View],
+    *,
+    fps: float = 30,
+    size: tuple[int, int] = (1280, 720),
+    speed: float = 1.0,
+    camera: str | None = None,
+) -> Iterator[Image]:
+    """The frames of the film that ``render`` writes, one by one, as for a notebook.
+
+    ``mediapy.show_video(list(mjhill.frames(view)), fps=30)`` shows them. The renderer is closed
+    with the last frame, or when the iterator is.
+
+    Args:
+        views: As for ``render``, and so all others.
+        fps: Frames per second of the film [1/s].
+        size: Width and height [px].
+        speed: Recorded time by film time [-].
+        camera: Name of a camera of each model; by default the first, or a free one.
+
+    Returns:
+        RGB pictures, shape (height, width, 3) each.
+
+    Raises:
+        ValueError: As ``render``, at once.
+        RuntimeError: There is no OpenGL to render with; with the first frame.
+    """
+    views = _listed(views)
+    _check_film(views, fps, speed, size)
+    return (frame.copy() for frame in _frames(views, fps, size, speed, camera))
+
+
+def _frames(
+    views: list[View], fps: float, size: tuple[int, int], speed: float, camera: str | None
+) -> Generator[Image, None, None]:
+    """The frames, all in the same array."""
     span = _span(views)
-    times = span[0] + np.arange(max(1, round((span[1] - span[0]) / speed * fps))) * speed / fps
     note = "" if speed == 1 else f"{speed:g}\N{MULTIPLICATION SIGN} speed"
     sides = [_side(view, note, size, i, len(views)) for i, view in enumerate(views)]
-    with replacing(path) as partial, ExitStack() as stack:
+    with ExitStack() as stack:
         reels = [
             stack.enter_context(_reel(view, side, camera))
             for view, side in zip(views, sides, strict=True)
         ]
         dashboard = make_dashboard(sides, size, span)
-        append = stack.enter_context(video_writer(partial, size, fps))
         frame = np.empty((size[1], size[0], 3), dtype=np.uint8)
-        for k, time in enumerate(times.tolist()):
+        for time in _times(views, fps, speed).tolist():
             pictures, readings = zip(*(reel.frame(time) for reel in reels), strict=True)
             dashboard.compose(frame, time, pictures, readings)
-            append(frame)
-            if progress is not None:
-                progress(k + 1, len(times))
-    return path
+            yield frame
+
+
+def _listed(views: View | Sequence[View]) -> list[View]:
+    return [views] if isinstance(views, View) else list(views)
+
+
+def _times(views: Sequence[View], fps: float, speed: float) -> NDArray[np.float64]:
+    """Recorded time of each frame [s]."""
+    first, last = _span(views)
+    count = max(1, round((last - first) / speed * fps))
+    return np.asarray(first + np.arange(count) * speed / fps)
 
 
 def snapshot(
@@ -204,17 +257,15 @@ def _span(views: Sequence[View]) -> tuple[float, float]:
     return min(starts), max(ends)
 
 
-def _check_film(views: Sequence[View], path: Path, fps: float, speed: float) -> None:
+def _check_film(views: Sequence[View], fps: float, speed: float, size: tuple[int, int]) -> None:
     if not views:
         raise ValueError("there must be at least one view to render, got none")
     if any(len(view.recording) == 0 for view in views):
         raise ValueError("a recording to render must have at least one sample, got none")
-    if path.suffix not in SUFFIXES:
-        raise ValueError(f"video {str(path)!r} must end in {' or '.join(SUFFIXES)}")
+    _check_size(size, even=True)
     for name, value in (("fps", fps), ("speed", speed)):
         if not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} must be positive and finite, got {value}")
-    check_writable(path)
 
 
 def _check_size(size: tuple[int, int], *, even: bool) -> None:

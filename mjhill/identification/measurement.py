@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.identification.columns import Column, Columns, read_columns
-from mjhill.identification.table import read_table
+from mjhill.identification.columns import Column, Columns, read_columns, read_table
 from mjhill.joints.joint import Joint
 
 _LEAST_SAMPLES = 50
