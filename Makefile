@@ -1,5 +1,5 @@
 # make demo, make test: set everything up, then do it. make check: format, lint, types.
-# make models: write the parameters of mjhill/data/joints.toml into models/.
+# make models: write the parameters of mjhill/joints/joints.toml into models/.
 # make joints: fit that file to the literature first, and write docs/joints.md.
 # make setup VENV=.venv-oldest VERSIONS=oldest: an environment with the oldest dependencies allowed.
 PYTHON ?= python3
@@ -30,14 +30,14 @@ format: $(READY)
 	@$(RUN)/ruff check --fix .
 
 models: $(READY)
-	@$(RUN)/python -m mjhill.mjcf models
+	@$(RUN)/python -m mjhill.engine.mjcf models
 
 joints: $(READY)
 	@mkdir -p out
 	@$(RUN)/mjhill identify --output out/joints > out/joints.txt
-	@cp out/joints/joints.toml mjhill/data/joints.toml
+	@cp out/joints/joints.toml mjhill/joints/joints.toml
 	@cp out/joints/report.md docs/joints.md
-	@$(RUN)/python -m mjhill.mjcf models
+	@$(RUN)/python -m mjhill.engine.mjcf models
 
 setup: $(READY)
 

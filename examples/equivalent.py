@@ -1,7 +1,7 @@
 """The triceps as one muscle: three heads and their equivalent, as the paper's Fig. 3.
 
 Forces and lengths are those of OpenSim's Arm26 (Holzbaur et al. 2005); their sources are in
-mjhill/data/synergists.toml.
+mjhill/literature/synergists.toml.
 """
 
 import sys

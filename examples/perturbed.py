@@ -9,7 +9,7 @@ from mjhill import experiments
 
 
 def main(path: str = "perturbed.png") -> None:
-    result = experiments.external_impulse("elbow", levels=(0.02, 0.2, 0.5))
+    result = experiments.external_impulse("elbow", cocontraction=(0.02, 0.2, 0.5))
     figure = Figure(figsize=result.size, layout="constrained")
     FigureCanvasAgg(figure)
     result.draw(figure)

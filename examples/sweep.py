@@ -7,7 +7,6 @@ import mujoco.batch
 import numpy as np
 
 import mjhill
-from mjhill.layout import SLOTS
 
 STRENGTHS = np.linspace(20, 100, 32)  # [N·m]
 INPUTS = np.linspace(0.05, 1.0, 32)  # [-]
@@ -17,7 +16,7 @@ STEPS = 800  # of 1 ms
 def main() -> None:
     model = mjhill.load("elbow")
     strength, level = (grid.ravel() for grid in np.meshgrid(STRENGTHS, INPUTS))
-    array, slot = SLOTS["max_isometric_force"]
+    array, slot = mjhill.muscle_model("hill").slots["max_isometric_force"]
     flexor = model.actuator("elbow_flexor").id
     with mjhill.installed():
         batch = mujoco.batch.Batch(model, nsim=len(level))

@@ -37,7 +37,7 @@ ARM = """
 """
 
 # estimates of the size of a biceps brachii, to show the units
-BICEPS = mjhill.Muscle(
+BICEPS = mjhill.Hill(
     max_isometric_force=600.0,  # [N]
     optimal_length=-0.03,  # [m] shorter than in the straight arm
     width_short=0.07,  # [m]

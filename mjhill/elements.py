@@ -1,8 +1,8 @@
 """The equations of the muscle and the joint, each once.
 
 Pure scalar functions: floats in, floats out, no arrays, no MuJoCo. The compiled back-end gives
-the same source to another compiler, so a function here calls only ``exp``, ``sqrt`` and the
-others of this file and of ``scheme``.
+the same source to another compiler, so a function here calls only ``exp``, ``log``, ``sqrt`` and
+others like it.
 
 Tension and shortening velocity are positive. Forces are in units of the maximum isometric
 force, velocities of the contractile element in units of its maximum velocity. Equation numbers
@@ -15,7 +15,7 @@ from math import exp, log, sqrt
 
 
 def excitation_rate(u: float, n: float, tau: float) -> float:
-    """Rate [1/s] of neural excitation n driven by input u (sect. 3.1, NEX)."""
+    """Rate [1/s] of neural excitation n, driven by the excitation u (sect. 3.1, NEX)."""
     return (u - n) / tau
 
 
@@ -91,6 +91,32 @@ def contractile_velocity(
     else:
         lengthening = (root - linear) / (2 * viscosity)
     return -lengthening, lengthening + c, root, c + plateau * lengthening
+
+
+def hill_relation(velocity: float, hill: float) -> float:
+    """Force of shortening at a velocity [V_max], in units of isometric force (eq. 3)."""
+    return hill * (1 - velocity) / (hill + velocity)
+
+
+def contractile_force(
+    velocity: float,
+    hypothetical: float,
+    hill: float,
+    plateau: float,
+    slope_ratio: float,
+    viscosity: float,
+) -> float:
+    """Force of the contractile element at a shortening velocity [V_max], never below 0.
+
+    ``contractile_velocity`` the other way round.
+    """
+    if velocity >= 0:
+        force = hypothetical * hill_relation(velocity, hill) - viscosity * velocity
+    else:
+        c = (plateau - 1) * hill / ((1 + hill) * slope_ratio)
+        force = hypothetical * (1 + (plateau - 1) * velocity / (velocity - c))
+        force -= viscosity * velocity
+    return max(force, 0.0)
 
 
 def series_force(

@@ -24,7 +24,7 @@ class FrozenDict(dict[_Key, _Value]):
         return hash(frozenset(self.items()))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """How to make it again: whole, because items cannot be put in one by one."""
+        """How to make it again: as a whole, because single items cannot be set."""
         return type(self), (dict(self),)
 
     def _refuse(self, *_arguments: Any, **_named: Any) -> NoReturn:

@@ -8,8 +8,8 @@ import mujoco
 import pytest
 
 import mjhill
-from mjhill.callbacks.slots import mujoco_library
-from mjhill.spec import joint_spec
+from mjhill.engine.callbacks import mujoco_library
+from mjhill.engine.spec import joint_spec
 
 # shells start background jobs with Ctrl-C ignored; the processes that tests start must not be
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -51,7 +51,7 @@ def elbow() -> mjhill.Joint:
 
 
 @pytest.fixture
-def muscle(elbow: mjhill.Joint) -> mjhill.Muscle:
+def muscle(elbow: mjhill.Joint) -> mjhill.Hill:
     return elbow.muscles["elbow_flexor"]
 
 

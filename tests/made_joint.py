@@ -2,7 +2,7 @@
 
 import mjhill
 
-MUSCLE = mjhill.Muscle(
+MUSCLE = mjhill.Hill(
     max_isometric_force=10.0,
     optimal_length=0.0,
     width_short=1.2,
@@ -16,7 +16,7 @@ MUSCLE = mjhill.Muscle(
 )
 
 
-def make_joint(muscle: mjhill.Muscle = MUSCLE, **changes) -> mjhill.Joint:
+def make_joint(muscle: mjhill.Hill = MUSCLE, **changes) -> mjhill.Joint:
     values = {
         "name": "joint",
         "positive": "right",

@@ -3,15 +3,16 @@
 import os
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
 from mjhill import JOINTS
-from mjhill.experiments.bench.rig import rig, run, still, strongest_angle
 from mjhill.experiments.result import Claim, Measure, Result
-from mjhill.recording import Recording
-from mjhill.reproduction import Entry
+from mjhill.lab.rig import at_rest, build_rig, record_run, strongest_angle
+from mjhill.report import Entry
+from mjhill.simulate.recording import Recording
 
 HOSTILE = "<script>alert(1)</script> & \"quoted\" 'text' {{ 7 * 7 }}"
 
@@ -56,10 +57,10 @@ class Rise(Result):
 
 
 def rise(joint="elbow", *, level=0.5, duration=0.05, exact=False, progress=None):
-    bench = rig(JOINTS[joint], exact=exact)
+    bench = build_rig(JOINTS[joint], exact=exact)
     muscle = next(iter(JOINTS[joint].muscles))
-    start = still(bench, strongest_angle(JOINTS[joint], muscle))
-    recording = run(bench, start, duration, excitation={muscle: level})
+    start = at_rest(bench, strongest_angle(JOINTS[joint], muscle))
+    recording = record_run(bench, start, duration, excitation={muscle: level})
     progress(0.5)
     return Rise(joint, recording, float(recording[f"{muscle}.force"].max()))
 
@@ -77,6 +78,7 @@ def not_finite(joint="elbow", *, progress=None):
 
 
 def endless(joint="elbow", *, progress=None):
+    Path(os.environ["AT_WORK"]).touch()
     while True:  # and reports nothing, so that a broken pipe does not end it
         time.sleep(0.02)
 

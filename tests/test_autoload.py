@@ -57,7 +57,7 @@ def expected(elbow):
         "import mujoco",
         "import mujoco, mjhill",
         "import mjhill, mujoco",
-        "import mjhill.layout, mujoco",
+        "import mjhill.engine.layout, mujoco",
         "import mujoco.rollout",
     ],
 )
@@ -75,12 +75,12 @@ def test_import_is_light_and_a_model_without_muscles_compiles_nothing():
     code = """
     import mujoco, sys
     heavy = {
-        "llvmlite", "numba", "scipy", "matplotlib", "mujoco.introspect", "mjhill.rendering",
+        "llvmlite", "numba", "scipy", "matplotlib", "mujoco.introspect", "mjhill.draw",
     }
     print(sorted(heavy & set(sys.modules)))
     m = mujoco.MjModel.from_xml_string(PLAIN)
     d = mujoco.MjData(m)
-    from mjhill.callbacks.slots import PROCESS
+    from mjhill.engine.callbacks import PROCESS
     for steps in (500, 1000):
         mujoco.mj_step(m, d, nstep=steps)
         print("numba" in sys.modules, [len(PROCESS.automatic[name]) for name in PROCESS.automatic])
@@ -235,12 +235,12 @@ def test_a_mujoco_that_cannot_be_read_is_named_once_and_other_models_run(elbow):
 
 
 BROKEN = {
-    "a module fails": ("callbacks/slots.py", "raise ImportError('broken')\n", "broken"),
-    "a symbol is missing": ("callbacks/slots.py", "NAMES += ('none',)\n", "mjcb_none"),
+    "a module fails": ("engine/callbacks.py", "raise ImportError('broken')\n", "broken"),
+    "a symbol is missing": ("engine/callbacks.py", "NAMES += ('none',)\n", "mjcb_none"),
     "it stops half way": (
-        "autoload.py", "def _address(f):\n    raise OSError('half way')\n", "half way",
+        "engine/autoload.py", "def _address(f):\n    raise OSError('half way')\n", "half way",
     ),
-    "a package is half removed": ("autoload.py", None, "mjhill.autoload"),
+    "a package is half removed": ("engine/autoload.py", None, "mjhill.engine.autoload"),
 }  # fmt: skip
 
 
@@ -307,7 +307,7 @@ def test_a_recording_needs_no_installation_but_refuses_where_the_callbacks_were_
 @pytest.mark.parametrize(
     "again",
     [
-        "import importlib; importlib.reload(sys.modules['mjhill.install'])",
+        "import importlib; importlib.reload(sys.modules['mjhill.engine.install'])",
         "[sys.modules.pop(k) for k in list(sys.modules) if k.startswith('mjhill')]",
     ],
 )

@@ -1,7 +1,7 @@
 import pytest
 from click.testing import CliRunner
 
-from mjhill.bench import checks
+from mjhill.benchmarks import checks
 from mjhill.cli import main
 
 COUNT = 15

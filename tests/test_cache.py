@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from mjhill.callbacks import code_cache
+from mjhill.engine import code_cache
 
 CODE = {"act_dyn": ("first", b"\x01\x02"), "passive": ("second", b"\x03")}
 NAMES = ("act_dyn", "passive")

@@ -8,7 +8,7 @@ import pytest
 from conftest import PLAIN_XML, rest
 
 import mjhill
-from mjhill.spec import joint_spec
+from mjhill.engine.spec import joint_spec
 
 INTEGRATORS = ["EULER", "RK4", "IMPLICIT", "IMPLICITFAST", "DISCRETE"]
 

@@ -7,9 +7,9 @@ import mujoco
 import pytest
 
 import mjhill
-from mjhill.equilibrium import check_states
-from mjhill.spec import joint_spec
-from mjhill.stability import Plant
+from mjhill.engine.equilibrium import check_states
+from mjhill.engine.spec import joint_spec
+from mjhill.engine.stability import Plant
 
 
 def flexor(spec):
@@ -120,7 +120,7 @@ def light(elbow, share):
 def test_what_a_timestep_can_hold_is_where_a_muscle_at_full_force_turns_unstable(elbow):
     # at L_opt and u = 1 the muscles stay where they are: the joint does not move but by itself
     model = light(elbow, 1e-3)
-    muscles = mjhill.layout.read_muscles(model)
+    muscles = mjhill.engine.layout.read_muscles(model)
     force = min(muscle.max_isometric_force for muscle in muscles.values())
     for name, muscle in muscles.items():
         equal = dataclasses.replace(muscle, max_isometric_force=force, optimal_length=0.0)
@@ -144,7 +144,7 @@ def test_what_a_timestep_can_hold_is_where_a_muscle_at_full_force_turns_unstable
 def test_without_yielding_the_limit_is_that_of_an_oscillator(elbow):
     model = light(elbow, 1.0)
     model.dof_damping[:] = 0.0
-    muscles = mjhill.layout.read_muscles(model)
+    muscles = mjhill.engine.layout.read_muscles(model)
     model.actuator_biasprm[:, 0] = 1e-9  # V_max, slower than any muscle that is allowed
     [plant] = Plant.parts(model)
     stiffness = sum(
@@ -173,7 +173,7 @@ def test_a_large_model_taken_in_parts_gives_the_loads_of_a_small_one(monkeypatch
     model = arms(4).compile()
     model.body_inertia[:, 1] = model.body_inertia[:, 2] = model.body_inertia[:, 0] = 1.0
     [whole] = Plant.parts(model)
-    monkeypatch.setattr("mjhill.stability._LARGE", 2)
+    monkeypatch.setattr("mjhill.engine.stability._LARGE", 2)
     parts = Plant.parts(model)
     assert len(parts) == 4
     assert [part.muscles for part in parts] == [(0, 1), (2, 3), (4, 5), (6, 7)]

@@ -98,7 +98,7 @@ def test_run_writes_a_recording_and_says_where(tmp_path):
         (("run", "elbow", "-e", "elbow_flexor=-0.1@0.5:1"), "must be 0 to 1, got -0.1 at 0.5 s"),
         (
             ("run", "elbow", "-e", "elbow_flexor=0.7", "-e", "elbow_flexor=0.7@1"),
-            "must be 0 to 1, got 1.4 at 1 s; lower the level, or the sum",
+            "must be 0 to 1, got 1.4 at 1 s; lower it, or the sum",
         ),
         (("run", "elbow", "-o", "run.txt"), "recording 'run.txt' must end in .csv or .npz"),
         (("video", "elbow", "-o", "film.avi"), "video 'film.avi' must end in .mp4 or .gif"),
@@ -217,8 +217,8 @@ def test_inputs_that_add_up_to_one_are_taken():
 
 
 def test_a_benchmark_says_how_long_it_takes_and_which_goals_are_met(monkeypatch):
-    monkeypatch.setattr("mjhill.bench.threads.SIMULATIONS", 8)
-    monkeypatch.setattr("mjhill.bench.threads.ROUNDS", 3)
+    monkeypatch.setattr("mjhill.benchmarks.threads.SIMULATIONS", 8)
+    monkeypatch.setattr("mjhill.benchmarks.threads.ROUNDS", 3)
     result = invoke("bench", "threads")
     assert result.stderr == "threads: about 10 s on two cores\n"
     head = next(line for line in result.stdout.splitlines() if "goal" in line)

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.comparison import Comparison, compare, responses, step_cost, trials, write
+from mjhill.analysis import responses
+from mjhill.comparison import Comparison, compare, step_cost, write
+from mjhill.comparison import table as trials
 from mjhill.comparison.cost import bare_spec
 from mjhill.comparison.native import read_spec
 
@@ -220,7 +222,7 @@ def test_the_video_shows_both_models_side_by_side(
         calls.append((views, path, speed))
         progress(1, 2)
 
-    monkeypatch.setattr("mjhill.rendering.render", render)
+    monkeypatch.setattr("mjhill.draw.render", render)
     paths = write(comparison, tmp_path, progress=shares.append)
     views, path, speed = calls[0]
     assert path == paths[-1] == tmp_path / "comparison.mp4"

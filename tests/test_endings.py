@@ -188,7 +188,7 @@ def test_a_signal_that_is_ignored_stays_ignored():
 LOST = """
 import os, signal, sys, threading, time
 import mujoco
-import mjhill.callbacks.structs as structs
+import mjhill.engine.structs as structs
 real = structs.verify_fields
 def slow():
     os.kill(os.getpid(), signal.SIGINT)  # while the muscle is being loaded

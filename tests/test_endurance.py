@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mjhill.bench import endurance
+from mjhill.benchmarks import endurance
 
 SMALL = 4  # pairs
 

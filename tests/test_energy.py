@@ -17,10 +17,11 @@ import pytest
 from conftest import rest
 
 import mjhill
-from mjhill.bench import balance
-from mjhill.readings import isometric_share, passive_energy, series_energy, tension
-from mjhill.reference import plant_torque
-from mjhill.spec import joint_spec
+from mjhill.benchmarks import balance
+from mjhill.engine.spec import joint_spec
+from mjhill.joints.joint import passive_energy
+from mjhill.muscles.readings import isometric_share, series_energy, tension
+from mjhill.simulate.reference import plant_torque
 
 SYSTEMS = ("elbow", "wrist", "knee", "ankle", "eye", 0, 1, 2, 3)  # numbers: variants of the elbow
 
@@ -206,7 +207,7 @@ def limb(integrator: str, timestep: float, changes: dict) -> mjhill.Recording:
     """A movement of the limb with some of its parts."""
     parts = {**PLAIN, **changes}
     spec = mujoco.MjSpec.from_string(LIMB.format(integrator=integrator, timestep=timestep, **parts))
-    puller = mjhill.Muscle(
+    puller = mjhill.Hill(
         max_isometric_force=300, optimal_length=0, width_short=0.1, width_long=0.1,
         max_velocity=0.8, hill_shape=0.3, series_stretch=0.02, excitation_tau=0.03,
         activation_tau=0.01, deactivation_tau=0.04, velocity_activation=0.3,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.equivalent import (
+from mjhill.muscles.equivalent import (
     anatomical_muscle,
     stretch_at_force,
     torque_at_length,

@@ -7,16 +7,11 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.linear_elements import (
-    contractile_viscosity,
-    linear_elements,
-    series_stiffness,
-)
-from mjhill.experiments.bench.posture import balanced
-from mjhill.experiments.bench.rig import UnmeasuredError
-from mjhill.experiments.paper.external_impulse import external_impulse
-from mjhill.experiments.trials.hit import Hammer
-from mjhill.experiments.trials.neural_burst import hit_with_burst
+from mjhill.experiments.external_impulse import external_impulse, impulse_with_burst
+from mjhill.lab.impulse import Impulse
+from mjhill.lab.postures import balancing_excitations
+from mjhill.lab.rig import UnmeasuredError
+from mjhill.lab.variants import contractile_viscosity, series_stiffness, with_linear_elements
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +21,8 @@ def elbow():
 
 def test_the_joint_is_still_before_and_after_without_a_hit(elbow):
     joint = mjhill.JOINTS["elbow"]
-    hammer = Hammer(elbow.angle, elbow.sign, 0.06, 0.02, 0.5)
-    run = hammer.hit(joint, 0.5, elbow.levels[0.5], 1e-9).run
+    impulse = Impulse(elbow.angle, elbow.sign, 0.06, 0.02, 0.5)
+    run = impulse.response(joint, 0.5, elbow.excitations[0.5], 1e-9).run
     assert np.abs(run["elbow.angle"] - elbow.angle).max() < 1e-6
 
 
@@ -45,14 +40,14 @@ def test_the_applied_torque_has_the_impulse(elbow):
 def test_right_after_the_hit_momentum_is_the_impulse_less_what_the_joint_took():
     """A hit far shorter than the response gives all bodies together J v."""
     joint = mjhill.JOINTS["elbow"]
-    inputs = balanced(joint, 0.02, joint.home_angle)
-    hit = Hammer(joint.home_angle, 1.0, 1.0, 0.002, 0.1).hit(joint, 0.02, inputs, 0.01)
+    inputs = balancing_excitations(joint, 0.02, joint.home_angle)
+    hit = Impulse(joint.home_angle, 1.0, 1.0, 0.002, 0.1).response(joint, 0.02, inputs, 0.01)
     velocity = hit.run["elbow.velocity"][2]
     assert velocity * (joint.inertia + 1.0) == pytest.approx(0.01, rel=0.005)
 
 
 def test_more_inertia_swings_slower(elbow):
-    heavy = external_impulse("elbow", levels=(0.2, 0.5), added_inertia=0.5, duration=0.5)
+    heavy = external_impulse("elbow", cocontraction=(0.2, 0.5), added_inertia=0.5, duration=0.5)
     for light, slow in zip(elbow.small[1:], heavy.small, strict=True):
         assert slow.swing.natural_frequency < light.swing.natural_frequency
 
@@ -91,16 +86,16 @@ def test_the_burst_acts_on_the_stretched_muscle_and_only_after_it_starts(elbow):
 
 
 def test_a_muscle_at_full_input_takes_no_burst(elbow):
-    joint, full = mjhill.JOINTS["elbow"], dict.fromkeys(elbow.levels[0.5], 1.0)
-    hammer = Hammer(elbow.angle, elbow.sign, 0.06, 0.02, 0.5)
-    with pytest.raises(UnmeasuredError, match="input of elbow_flexor is full"):
-        hit_with_burst(hammer, joint, full, impulse=0.1, height=0.3)
+    joint, full = mjhill.JOINTS["elbow"], dict.fromkeys(elbow.excitations[0.5], 1.0)
+    impulse = Impulse(elbow.angle, elbow.sign, 0.06, 0.02, 0.5)
+    with pytest.raises(UnmeasuredError, match="excitation of elbow_flexor is 1"):
+        impulse_with_burst(impulse, joint, full, size=0.1, height=0.3)
 
 
 def test_linear_elements_agree_at_the_inputs_that_they_are_made_for(elbow):
     joint = mjhill.JOINTS["elbow"]
-    flat = linear_elements(joint, elbow.levels[0.2], elbow.angle)
-    for name, level in elbow.levels[0.2].items():
+    flat = with_linear_elements(joint, elbow.excitations[0.2], elbow.angle)
+    for name, level in elbow.excitations[0.2].items():
         length = joint.gears[name] * elbow.angle
         one, other = joint.muscles[name], flat.muscles[name]
         for slope in (series_stiffness, contractile_viscosity):
@@ -111,16 +106,16 @@ def test_linear_elements_agree_at_the_inputs_that_they_are_made_for(elbow):
 
 
 def test_a_level_that_is_not_held_is_reported_and_the_rest_measured():
-    result = external_impulse("wrist", angle=0.0, levels=(0.02, 0.1, 0.5), duration=0.4)
-    assert [hit.level for hit in result.small] == [0.02, 0.1]
+    result = external_impulse("wrist", angle=0.0, cocontraction=(0.02, 0.1, 0.5), duration=0.4)
+    assert [hit.cocontraction for hit in result.small] == [0.02, 0.1]
     notes = [measure.note for measure in result.measures() if "co-contraction 0.5" in measure.name]
     assert "drifts away" in notes[0]
     with pytest.raises(UnmeasuredError, match="drifts away"):
-        external_impulse("wrist", angle=0.0, levels=(0.5, 0.6))
+        external_impulse("wrist", angle=0.0, cocontraction=(0.5, 0.6))
 
 
 def test_one_level_decides_nothing_about_several():
-    result = external_impulse("wrist", angle=0.0, levels=(0.02, 0.5), duration=0.4)
+    result = external_impulse("wrist", angle=0.0, cocontraction=(0.02, 0.5), duration=0.4)
     assert [claim.holds for claim in result.claims()] == [None, None, None, True, None]
 
 
@@ -128,7 +123,7 @@ def test_one_level_decides_nothing_about_several():
     ("options", "message"),
     [
         ({"joint": "tail"}, "unknown joint 'tail'; there are: elbow"),
-        ({"levels": (0.5, 0.2)}, "levels must be 2 or more ascending"),
+        ({"cocontraction": (0.5, 0.2)}, "cocontraction must be 2 or more ascending"),
         ({"angle": 4.0}, "angle must be in the range of elbow, 0 to 2.496 rad, got 4"),
         ({"width": -0.01}, r"width must be in \(0, 0.375\] s, got -0.01"),
         ({"deflection": 0.0}, "deflection must be in"),
@@ -145,7 +140,9 @@ def test_bad_options_are_refused(options, message):
 
 def test_the_figure_the_film_and_the_numbers_are_there(elbow):
     shares = []
-    result = external_impulse("eye", levels=(0.02, 0.5), duration=0.35, progress=shares.append)
+    result = external_impulse(
+        "eye", cocontraction=(0.02, 0.5), duration=0.35, progress=shares.append
+    )
     assert shares[-1] == 1.0
     assert shares == sorted(shares)
     figure = Figure(figsize=result.size)

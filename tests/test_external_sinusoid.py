@@ -7,10 +7,13 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.drives import Drive
-from mjhill.experiments.bench.rig import UnmeasuredError, muscle_torque, net_torque, rig
-from mjhill.experiments.paper.external_sinusoid import external_sinusoid
-from mjhill.experiments.trials.sinusoids import Curve, shaken
+from mjhill.experiments.external_sinusoid import (
+    Curve,
+    Oscillation,
+    external_sinusoid,
+    frequency_responses,
+)
+from mjhill.lab.rig import UnmeasuredError, build_rig, muscle_torque, net_torque
 
 
 @pytest.fixture(scope="module")
@@ -33,8 +36,10 @@ def test_a_spring_and_a_damper_have_the_textbook_response(damping):
     """Also overdamped: at 2 N·m·s/rad the damping ratio is 1.3."""
     joint = passive_joint(damping)
     band = np.geomspace(0.5, 20.0, 16)
-    drive = Drive("shaken", 0.0, {}, 0.1)
-    (curve,) = shaken(rig(joint, exact=True), joint.rest_angle, [drive], band)
+    oscillation = Oscillation("shaken", 0.0, {}, 0.1)
+    (curve,) = frequency_responses(
+        build_rig(joint, exact=True), joint.rest_angle, [oscillation], band
+    )
     turning = 2 * np.pi * band
     truth = 1 / (joint.stiffness - joint.inertia * turning**2 + 1j * damping * turning)
     np.testing.assert_allclose(curve.gain, np.abs(truth), rtol=0.01)
@@ -46,7 +51,7 @@ def test_a_spring_and_a_damper_have_the_textbook_response(damping):
 
 def test_a_response_that_only_falls_has_no_resonance():
     band = np.array([1.0, 2.0, 4.0])
-    flat = Curve(Drive("", 0.0, {}), 0.0, band, 1 / band**3, np.zeros(3), np.ones(3))
+    flat = Curve(Oscillation("", 0.0, {}), 0.0, band, 1 / band**3, np.zeros(3), np.ones(3))
     assert flat.resonance is None
     assert flat.low_gain == 1.0
 
@@ -54,8 +59,8 @@ def test_a_response_that_only_falls_has_no_resonance():
 def test_the_bias_is_what_the_muscle_holds(elbow):
     joint = mjhill.JOINTS["elbow"]
     for curve, share in zip(elbow.bias, (0.0, 0.1, 0.2, 0.4), strict=True):
-        assert curve.drive.inputs == {"elbow_flexor": share, "elbow_extensor": 0.0}
-        assert curve.bias == -net_torque(joint, curve.drive.inputs, elbow.angle)
+        assert curve.oscillation.excitations == {"elbow_flexor": share, "elbow_extensor": 0.0}
+        assert curve.bias == -net_torque(joint, curve.oscillation.excitations, elbow.angle)
     held = elbow.bias[0].bias - elbow.bias[3].bias
     assert held == pytest.approx(
         0.4 * muscle_torque(joint, "elbow_flexor", 1.0, elbow.angle), rel=0.01
@@ -77,8 +82,10 @@ def test_at_high_frequency_only_inertia_is_left(elbow):
 def test_half_the_torque_gives_the_same_gain():
     """Small enough to be linear."""
     pair = [
-        external_sinusoid("elbow", shares=(0.1, 0.2), levels=(0.2, 0.5), band=(1.0, 8.0), angle=1.9,
-                          deflection=deflection).bias[0]
+        external_sinusoid(
+            "elbow", bias=(0.1, 0.2), cocontraction=(0.2, 0.5), band=(1.0, 8.0), angle=1.9,
+            deflection=deflection,
+        ).bias[0]
         for deflection in (0.02, 0.01)
     ]  # fmt: skip
     np.testing.assert_allclose(pair[0].gain, pair[1].gain, rtol=0.03)
@@ -95,21 +102,21 @@ def test_claims_follow_from_the_curves(elbow):
 
 
 def test_a_resonance_outside_the_band_decides_nothing():
-    low = external_sinusoid("elbow", shares=(0.1, 0.4), levels=(0.2, 0.5), band=(0.5, 4.0))
+    low = external_sinusoid("elbow", bias=(0.1, 0.4), cocontraction=(0.2, 0.5), band=(0.5, 4.0))
     assert [claim.holds for claim in low.claims()][:2] == [None, None]
     assert "not within the band" in next(low.claims()).evidence
 
 
 def test_a_condition_that_is_not_held_is_reported():
-    result = external_sinusoid("wrist", angle=0.0, levels=(0.02, 0.5), shares=(0.0, 0.1),
+    result = external_sinusoid("wrist", angle=0.0, cocontraction=(0.02, 0.5), bias=(0.0, 0.1),
                                band=(1.0, 8.0))  # fmt: skip
-    assert [curve.drive.label for curve in result.cocontraction] == ["co-contraction 0.02"]
+    assert [curve.oscillation.label for curve in result.cocontraction] == ["co-contraction 0.02"]
     assert (
         "drifts away"
         in {m.name: m.note for m in result.measures()}["response under co-contraction 0.5"]
     )
     with pytest.raises(UnmeasuredError, match="drifts away"):
-        external_sinusoid("elbow", angle=1.274, levels=(0.4, 0.5), shares=(0.3, 0.4))
+        external_sinusoid("elbow", angle=1.274, cocontraction=(0.4, 0.5), bias=(0.3, 0.4))
 
 
 @pytest.mark.parametrize(
@@ -117,8 +124,8 @@ def test_a_condition_that_is_not_held_is_reported():
     [
         ({"joint": "tail"}, "unknown joint 'tail'; there are: elbow"),
         ({"muscle": "biceps"}, "unknown muscle 'biceps'; there are: elbow_flexor, elbow_extensor"),
-        ({"shares": (0.1, 1.2)}, "shares must be 2 or more ascending"),
-        ({"levels": (0.5, 0.2)}, "levels must be 2 or more ascending"),
+        ({"bias": (0.1, 1.2)}, "bias must be 2 or more ascending"),
+        ({"cocontraction": (0.5, 0.2)}, "cocontraction must be 2 or more ascending"),
         ({"band": (5.0, 1.0)}, "band must ascend within 0.05 to 100 Hz, got 5.0 to 1.0 Hz"),
         ({"band": (1.0, 400.0)}, "band must ascend"),
         ({"angle": 9.0}, "angle must be in the range of elbow"),

@@ -9,22 +9,24 @@ import pytest
 from made_joint import MUSCLE
 
 import mjhill
-from mjhill.experiments.bench.posture import holding
-from mjhill.experiments.bench.rig import (
+from mjhill.experiments.twitch import muscle_twitch
+from mjhill.identification import facts as measured
+from mjhill.identification.facts import Fact, facts
+from mjhill.lab.ballistic import ballistic_movement, free_velocity
+from mjhill.lab.impedance import held_impedance, passive_stiffness, stiffness_slope
+from mjhill.lab.postures import holding_excitations
+from mjhill.lab.rig import (
     UnmeasuredError,
-    angles,
+    angle_series,
+    at_rest,
+    build_rig,
     muscle_torque,
-    rig,
-    run,
-    still,
+    record_run,
     strongest_angle,
 )
-from mjhill.experiments.trials.free_velocity import free_velocity
-from mjhill.experiments.trials.impedance import held_impedance, passive_stiffness, stiffness_slope
-from mjhill.experiments.trials.muscle_twitch import muscle_twitch
-from mjhill.experiments.trials.turn import turn
-from mjhill.identification.facts import Fact, facts, read_entries
-from mjhill.reference import plant_torque
+from mjhill.literature import facts as published
+from mjhill.literature.facts import read_entries
+from mjhill.simulate.reference import plant_torque
 
 NO_ELASTICITY = mjhill.Passive(k1_pos=0.0, k2_pos=1.0, k1_neg=0.0, k2_neg=1.0)
 
@@ -41,87 +43,92 @@ source = "none"
 """
 
 
-def make_joint(muscle: mjhill.Muscle = MUSCLE, **changes) -> mjhill.Joint:
+def make_joint(muscle: mjhill.Hill = MUSCLE, **changes) -> mjhill.Joint:
     return made_joint.make_joint(muscle, **{"passive": NO_ELASTICITY, **changes})
 
 
-def turn_of(joint, degrees, braked):
-    return turn(joint, "puller", amplitude=radians(degrees), duration=0.5, braked=braked)
+def movement_of(joint, degrees, braked):
+    return ballistic_movement(
+        joint, "puller", amplitude=radians(degrees), duration=0.5, braked=braked
+    )
 
 
 # --- the bench
 
 
 def test_a_search_sees_the_angles_of_the_recorded_run_bit_for_bit():
-    bench = rig(make_joint())
+    bench = build_rig(make_joint())
     inputs = {"puller": mjhill.pulse(1.0, 0.0, 0.05), "opponent": mjhill.pulse(1.0, 0.05, 0.03)}
-    start = still(bench, 0.2)
-    searched = angles(bench, start, 0.2, inputs)
-    assert np.array_equal(searched, run(bench, start, 0.2, excitation=inputs)["joint.angle"])
+    start = at_rest(bench, 0.2)
+    searched = angle_series(bench, start, 0.2, inputs)
+    assert np.array_equal(searched, record_run(bench, start, 0.2, excitation=inputs)["joint.angle"])
 
 
 @pytest.mark.parametrize("angle", [-0.5, 0.0, 0.5])
 def test_a_joint_stays_where_it_is_held(angle):
     joint = make_joint()
-    bench, levels = rig(joint), holding(joint, "puller", angle)
-    end = run(bench, still(bench, angle, levels), 0.5, excitation=levels)["joint.angle"][-1]
+    bench, levels = build_rig(joint), holding_excitations(joint, "puller", angle)
+    end = record_run(bench, at_rest(bench, angle, levels), 0.5, excitation=levels)["joint.angle"][
+        -1
+    ]
     assert end == pytest.approx(angle, abs=1e-6)
 
 
 def test_a_joint_too_stiff_for_its_muscle_is_not_held():
-    with pytest.raises(UnmeasuredError, match="full input of puller does not hold joint"):
-        holding(make_joint(stiffness=100.0), "puller", 0.5)
+    with pytest.raises(UnmeasuredError, match="full excitation of puller does not hold joint"):
+        holding_excitations(make_joint(stiffness=100.0), "puller", 0.5)
 
 
-# --- turns
+# --- ballistic movements
 
 
 @pytest.mark.parametrize("braked", [False, True])
-def test_a_turn_goes_its_amplitude_and_no_farther(braked):
+def test_a_movement_goes_its_amplitude_and_no_farther(braked):
     joint = make_joint(damping=0.3)  # well damped, so that it needs no brake
     for degrees in (5, 40):
-        found = turn_of(joint, degrees, braked)
+        found = movement_of(joint, degrees, braked)
         assert found.progress.max() == pytest.approx(1.0, abs=1e-3)
         assert found.progress[-1] == pytest.approx(1.0, abs=0.06)
 
 
 @pytest.mark.parametrize("braked", [False, True])
-def test_peak_velocity_and_duration_rise_with_the_amplitude_of_a_turn(braked):
-    turns = [turn_of(make_joint(damping=0.3), degrees, braked) for degrees in (5, 20, 60)]
-    assert (np.diff([one.peak_velocity for one in turns]) > 0).all()
-    assert (np.diff([one.duration(radians(30.0)) for one in turns]) > 0).all()
+def test_peak_velocity_and_duration_rise_with_the_amplitude_of_a_movement(braked):
+    movements = [movement_of(make_joint(damping=0.3), degrees, braked) for degrees in (5, 20, 60)]
+    assert (np.diff([one.peak_velocity for one in movements]) > 0).all()
+    assert (np.diff([one.duration(radians(30.0)) for one in movements]) > 0).all()
 
 
-def test_a_brake_makes_a_turn_faster_and_its_pulse_wider():
+def test_a_brake_makes_a_movement_faster_and_its_pulse_wider():
     joint = make_joint(damping=0.3)
-    free, braked = turn_of(joint, 40, False), turn_of(joint, 40, True)
+    free, braked = movement_of(joint, 40, False), movement_of(joint, 40, True)
     assert free.brake == 0 < braked.brake
     assert braked.pulse > free.pulse
     assert braked.peak_velocity > free.peak_velocity
 
 
-def test_turns_of_mirrored_muscles_are_mirrored():
+def test_movements_of_mirrored_muscles_are_mirrored():
     joint = make_joint(damping=0.3)
     there, back = (
-        turn(joint, name, amplitude=0.5, duration=0.5, braked=True) for name in joint.muscles
+        ballistic_movement(joint, name, amplitude=0.5, duration=0.5, braked=True)
+        for name in joint.muscles
     )
     assert back.pulse == pytest.approx(there.pulse)
     # exact searches, but sums of torques in another order
     np.testing.assert_allclose(back.velocity, there.velocity, atol=1e-6)
 
 
-def test_a_turn_that_swings_past_by_itself_needs_a_brake():
+def test_a_movement_that_swings_past_without_a_pulse_needs_a_brake():
     joint = make_joint(damping=0.01)
     with pytest.raises(UnmeasuredError, match="even without a pulse"):
-        turn_of(joint, 30, False)
-    assert turn_of(joint, 30, True).progress.max() == pytest.approx(1.0, abs=1e-3)
+        movement_of(joint, 30, False)
+    assert movement_of(joint, 30, True).progress.max() == pytest.approx(1.0, abs=1e-3)
 
 
 def test_a_turn_wider_than_the_range_or_too_far_for_its_time_is_not_measured():
     with pytest.raises(UnmeasuredError, match="wider than the range"):
-        turn_of(make_joint(), 150, False)
-    with pytest.raises(UnmeasuredError, match="does not turn it by 60° in 0.02 s"):
-        turn(make_joint(), "puller", amplitude=radians(60), duration=0.02)
+        movement_of(make_joint(), 150, False)
+    with pytest.raises(UnmeasuredError, match="does not move it by 60° in 0.02 s"):
+        ballistic_movement(make_joint(), "puller", amplitude=radians(60), duration=0.02)
 
 
 # --- twitches
@@ -139,7 +146,7 @@ def test_a_twitch_peaks_later_and_relaxes_more_slowly_with_larger_time_constants
 
 def test_a_twitch_is_isometric_at_the_angle_of_the_largest_force():
     joint = make_joint(replace(MUSCLE, optimal_length=0.3))
-    angle = muscle_twitch(joint, "puller").run["joint.angle"]
+    angle = muscle_twitch(joint, "puller").recording["joint.angle"]
     assert angle[0] == pytest.approx(-0.3)
     assert np.ptp(angle) < radians(0.2)  # what the dynamometer gives way
     assert strongest_angle(make_joint(range=(-0.1, 1.0)), "puller") == 0.0
@@ -253,7 +260,7 @@ def test_only_the_joints_given_are_measured_with_the_parameters_given():
 def test_velocities_are_given_in_the_unit_of_the_publication():
     eye = mjhill.JOINTS["eye"]
     fact = facts({"eye": eye})[0]
-    saccade = turn(eye, "lateral_rectus", amplitude=radians(5), duration=0.2)
+    saccade = ballistic_movement(eye, "lateral_rectus", amplitude=radians(5), duration=0.2)
     assert fact.unit == "°/s"
     assert fact.measured == pytest.approx(np.degrees(saccade.peak_velocity))
 
@@ -272,7 +279,7 @@ def test_what_cannot_be_measured_is_reported_with_its_reason():
     for fact in facts({"eye": stuck}):
         assert fact.measured is None
         assert fact.within is None
-        assert "full input of medial_rectus does not hold eye" in fact.note
+        assert "full excitation of medial_rectus does not hold eye" in fact.note
 
 
 def test_names_that_do_not_exist_are_refused_with_those_that_do(tmp_path):
@@ -294,3 +301,7 @@ def test_names_that_do_not_exist_are_refused_with_those_that_do(tmp_path):
             read_entries(path)
     path.write_text(ENTRY, encoding="utf-8")
     assert read_entries(path)[0].quantity == "speed"
+
+
+def test_every_measure_that_the_file_can_name_is_there():
+    assert set(published.MEASURES) == set(measured.MEASURES)

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import mjhill
+from mjhill.draw.plot import plot_recording
 from mjhill.files import partial_folder, replacing, sweep
 from mjhill.identification.report import markdown
-from mjhill.plots import plot_recording
 
 
 @pytest.fixture

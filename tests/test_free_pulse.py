@@ -7,13 +7,12 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.rest import resting_angle
-from mjhill.experiments.bench.rig import UnmeasuredError
-from mjhill.experiments.bench.variants import AS_IT_IS, FAST
-from mjhill.experiments.paper.free_pulse import FreePulse, free_pulse
-from mjhill.experiments.trials.pulses import ratio_at, ratio_over_time
-from mjhill.reference import rest_state, simulate
-from mjhill.signals import pulse
+from mjhill.experiments.free_pulse import FreePulse, free_pulse, ratio_at, ratio_over_time
+from mjhill.lab.postures import resting_angle
+from mjhill.lab.rig import UnmeasuredError
+from mjhill.lab.variants import AS_IT_IS, FAST
+from mjhill.simulate.reference import rest_state, simulate
+from mjhill.simulate.signals import pulse
 
 
 @cache
@@ -113,7 +112,7 @@ def test_the_figure_has_strengths_widths_and_their_ratio():
     assert titles == ["for 100 ms", "at 100%", "100% over 50%"]
 
 
-def test_measures_name_level_and_width():
+def test_measures_name_excitation_and_width():
     names = [measure.name for measure in elbow_pulse().measures()]
     assert "25% for 100 ms: peak velocity" in names
     assert len(names) == len(set(names))
@@ -126,8 +125,8 @@ def test_measures_name_level_and_width():
         ({"widths": (-0.1,)}, "widths must ascend"),
         ({"widths": (0.2, 0.1)}, "widths must ascend"),
         ({"width": 0.0}, "widths must ascend"),
-        ({"levels": (0.3, 0.5)}, "each twice the one before"),
-        ({"levels": (1.0, 2.0)}, "in .0, 1."),
+        ({"excitations": (0.3, 0.5)}, "each twice the one before"),
+        ({"excitations": (1.0, 2.0)}, "in .0, 1."),
         ({"duration": -1.0}, "duration must be positive"),
     ],
 )

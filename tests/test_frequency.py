@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from mjhill.experiments.bench.frequency import (
+from mjhill.analysis.frequency import (
     SecondOrderFrequency,
     decibel,
     fit_second_order,
@@ -95,7 +95,7 @@ def test_the_fit_of_a_band_is_off_by_no_more_than_allowed():
     gain, phase = np.abs(response), np.angle(response)
     fit, highest = second_order_band(BAND, gain, phase)
     inside = highest >= BAND
-    off_gain, off_phase = fit.off(BAND[inside], gain[inside], phase[inside])
+    off_gain, off_phase = fit.errors(BAND[inside], gain[inside], phase[inside])
     assert np.abs(off_gain).max() <= 3.0
     assert np.abs(off_phase).max() <= radians(30.0)
 
@@ -116,12 +116,12 @@ def test_a_record_that_cannot_show_the_frequency_is_refused(frequency):
 
 
 def test_a_drive_without_the_frequency_is_refused():
-    with pytest.raises(ValueError, match="the drive has nothing at 2 Hz"):
+    with pytest.raises(ValueError, match="the input signal does not contain 2 Hz"):
         response_at(TIME, np.zeros_like(TIME), np.sin(TIME), 2.0)
 
 
 def test_a_fit_of_one_frequency_or_without_gain_is_refused():
-    with pytest.raises(ValueError, match="at least two frequencies"):
+    with pytest.raises(ValueError, match="needs two or more frequencies"):
         fit_second_order([1.0], [1.0], [0.0])
     with pytest.raises(ValueError, match="positive"):
         fit_second_order([1.0, 2.0], [1.0, 0.0], [0.0, 0.0])

@@ -4,11 +4,12 @@ import pytest
 from click.testing import CliRunner
 
 import mjhill
-from mjhill.bench import fuzz
-from mjhill.bench.fuzz import trial
-from mjhill.bench.fuzz.models import INTEGRATORS, KINDS, TIMESTEPS
+from mjhill.benchmarks import fuzz
+from mjhill.benchmarks.fuzz import trial
+from mjhill.benchmarks.fuzz.models import INTEGRATORS, KINDS, TIMESTEPS
 from mjhill.cli import main
-from mjhill.parameters import Muscle, quantities
+from mjhill.muscles.hill import Hill
+from mjhill.quantity import quantities
 
 COUNT = 1000
 
@@ -47,9 +48,9 @@ def test_muscles_are_drawn_from_the_whole_of_their_ranges():
         muscle
         for number in range(150)
         for kind in KINDS
-        for muscle in mjhill.layout.read_muscles(trial.draw(kind, number).model).values()
+        for muscle in mjhill.engine.layout.read_muscles(trial.draw(kind, number).model).values()
     ]
-    for name, quantity in quantities(Muscle):
+    for name, quantity in quantities(Hill):
         values = [getattr(muscle, name) for muscle in drawn]
         assert max(values) == quantity.high, name
         assert min(values) == quantity.low if quantity.low_allowed else min(values) < 1.01, name

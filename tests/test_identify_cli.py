@@ -7,8 +7,8 @@ from click.testing import CliRunner
 
 import mjhill
 from mjhill.cli import main
-from mjhill.experiments.bench.rig import rig, run, still
-from mjhill.joints import parameter_file, read_joints
+from mjhill.joints.reader import parameter_file, read_joints
+from mjhill.lab.rig import at_rest, build_rig, record_run
 
 FILES = ["hip.png", "identify.json", "joints.toml", "report.md"]
 
@@ -32,10 +32,10 @@ def refused(result, message, code=2):
 @pytest.fixture
 def measurement(elbow, tmp_path):
     """A file of a short movement of the elbow."""
-    bench = rig(elbow)
-    recording = run(
+    bench = build_rig(elbow)
+    recording = record_run(
         bench,
-        still(bench, elbow.home_angle),
+        at_rest(bench, elbow.home_angle),
         0.3,
         excitation={"elbow_flexor": mjhill.pulse(0.6, 0.05, 0.1)},
     )

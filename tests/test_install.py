@@ -10,8 +10,8 @@ import pytest
 from conftest import raw_callbacks, rest
 
 import mjhill
-from mjhill.callbacks.structs import offset, verify
-from mjhill.spec import joint_spec
+from mjhill.engine.spec import joint_spec
+from mjhill.engine.structs import offset, verify
 
 ACTUATOR = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
 GENERIC = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
@@ -189,7 +189,7 @@ def test_a_model_loads_while_callbacks_are_installed(backend):
 
 def test_offsets_that_do_not_fit_memory_are_an_error(pair, monkeypatch):
     verify(pair, mujoco.MjData(pair), ["mjModel.opt.timestep", "mjData.act"])
-    monkeypatch.setattr("mjhill.callbacks.structs.offset", lambda path: offset(path) + 8)
+    monkeypatch.setattr("mjhill.engine.structs.offset", lambda path: offset(path) + 8)
     with pytest.raises(RuntimeError, match=r"keeps mjData.act elsewhere .* backend=\"python\""):
         verify(pair, mujoco.MjData(pair), ["mjData.act"])
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from mjhill.identification.intervals import intervals
-from mjhill.identification.solve import solve
+from mjhill.identification.fit import intervals, solve
 
 
 def test_a_straight_problem_keeps_the_intervals_of_its_covariance():

@@ -7,9 +7,16 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.rig import UnmeasuredError
-from mjhill.experiments.paper.isotonic import BOTH, INERTIA, NAIVE, Isotonic, isotonic
-from mjhill.experiments.trials.quick_release import RELEASE, own_curve
+from mjhill.experiments.isotonic import (
+    BOTH,
+    INERTIA,
+    NAIVE,
+    RELEASE,
+    Isotonic,
+    isotonic,
+    torque_velocity_curve,
+)
+from mjhill.lab.rig import UnmeasuredError
 
 
 @cache
@@ -25,7 +32,7 @@ def test_the_element_is_recovered_once_the_limb_is_subtracted():
 
 def test_what_is_subtracted_leaves_the_force_of_the_muscle():
     result = elbow_release()
-    torques = result.read()[BOTH]
+    torques = result.estimates()[BOTH]
     for torque, recording in zip(torques, result.recordings.values(), strict=True):
         angle = recording["elbow.angle"]
         passed = int(np.argmax(angle >= result.angle))
@@ -45,9 +52,9 @@ def test_the_heavier_the_load_the_slower_the_joint():
     assert np.all(np.diff(velocities) < 0)
 
 
-def test_the_own_curve_is_hills(elbow):
+def test_the_torque_velocity_curve_is_hills(elbow):
     muscle = replace(elbow.muscles["elbow_flexor"], velocity_activation=0.0, viscosity=1e-6)
-    velocity, torque = own_curve(muscle, muscle.optimal_length)
+    velocity, torque = torque_velocity_curve(muscle, muscle.optimal_length)
     assert torque[0] == pytest.approx(muscle.max_isometric_force)
     assert velocity[-1] == pytest.approx(muscle.max_velocity, rel=1e-3)
     share, speed = torque / muscle.max_isometric_force, velocity / muscle.max_velocity
@@ -113,7 +120,7 @@ def test_the_film_is_the_lightest_load():
         ({"loads": (0.1, 0.5, 1.0)}, "in .0, 1. of the torque held"),
         ({"duration": 0.01}, "duration must be above 0.05 s"),
         ({"angle": 9.0}, "angle and start must be in the range of elbow, 0 to 143°"),
-        ({"angle": 1.0, "start": 1.5}, "elbow_flexor pull from start to angle"),
+        ({"angle": 1.0, "start": 1.5}, "elbow_flexor must pull from start to angle"),
     ],
 )
 def test_bad_options_are_refused(options, message):

@@ -6,17 +6,21 @@ from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.dynamometry import stiff_machine
-from mjhill.experiments.bench.rig import UnmeasuredError, muscle_torque
-from mjhill.experiments.bench.velocity_clamp import (
+from mjhill.experiments.isovelocity import isovelocity
+from mjhill.lab.dynamometer import (
     clamped_path,
-    contractile_force,
-    own_torque,
+    contractile_torque,
+    stiff_machine,
     travel_time,
 )
-from mjhill.experiments.paper.isovelocity import isovelocity
-from mjhill.experiments.trials.torque_velocity import isometric, make_sweep, measure
-from mjhill.readings import shortening_velocity, steady_stretch, tension
+from mjhill.lab.rig import UnmeasuredError, muscle_torque
+from mjhill.lab.torque_velocity import make_sweep, measure_curve, measure_isometric
+from mjhill.muscles.readings import (
+    contractile_force,
+    shortening_velocity,
+    steady_stretch,
+    tension,
+)
 
 EVEN = replace(MUSCLE, width_short=50.0, width_long=50.0)  # as strong at any angle
 
@@ -24,7 +28,7 @@ EVEN = replace(MUSCLE, width_short=50.0, width_long=50.0)  # as strong at any an
 def curve(muscle, velocities, before=1.0, angles=None):
     joint = make_joint(muscle)
     sweep = make_sweep(joint, "puller", np.array(velocities), angles)
-    return sweep, measure(joint, stiff_machine(joint), sweep, before=before)
+    return sweep, measure_curve(joint, stiff_machine(joint), sweep, before=before)
 
 
 # --- the machine's path and the contractile element
@@ -70,7 +74,7 @@ def test_contractile_force_is_isometric_at_rest_and_nothing_past_the_largest_vel
 
 def test_a_gear_divides_velocity_and_multiplies_force():
     joint = make_joint(gears={"puller": -2.0, "opponent": 1.0})
-    assert own_torque(joint, "puller", 1.0, 0.0, 3.0) == pytest.approx(
+    assert contractile_torque(joint, "puller", 1.0, 0.0, 3.0) == pytest.approx(
         2 * contractile_force(MUSCLE, 1.0, 0.0, 6.0)
     )
 
@@ -85,26 +89,26 @@ def test_a_contracted_muscle_as_strong_at_any_angle_gives_hills_curve():
     for k, velocity in enumerate(velocities):
         hill = contractile_force(EVEN, 1.0, 0.0, velocity)
         assert found.at[-1, k] == pytest.approx(hill, rel=0.01)
-        assert found.own[-1, k] == pytest.approx(hill, rel=0.01)
+        assert found.contractile[-1, k] == pytest.approx(hill, rel=0.01)
 
 
 def test_a_muscle_with_hardly_any_series_element_gives_the_contractile_elements_own():
     quick = replace(MUSCLE, series_stretch=0.004)
     for before in (0.0, 1.0):
         _, found = curve(quick, [0.5, 1.0, 2.0, 4.0, -1.0], before)
-        np.testing.assert_allclose(found.at, found.own, atol=0.01 * 10.0)
+        np.testing.assert_allclose(found.at, found.contractile, atol=0.01 * 10.0)
 
 
 def test_a_series_element_carries_more_than_the_contractile_element_while_it_recoils():
     _, found = curve(replace(EVEN, series_stretch=0.5), [10.0])
-    above = (found.at - found.own)[:, 0]
+    above = (found.at - found.contractile)[:, 0]
     assert above[0] > above[1] > above[2] > 0
 
 
 def test_the_isometric_torque_is_the_muscles_own():
     joint = make_joint()
     sweep = make_sweep(joint, "puller", np.array([1.0]), np.array([-0.5, 0.0, 0.4]))
-    largest, at = isometric(joint, stiff_machine(joint), sweep)
+    largest, at = measure_isometric(joint, stiff_machine(joint), sweep)
     wanted = [muscle_torque(joint, "puller", 1.0, angle) for angle in sweep.angles]
     np.testing.assert_allclose(at, wanted, rtol=5e-3)
     assert largest == pytest.approx(10.0, rel=5e-3)
@@ -129,7 +133,7 @@ def test_without_a_series_element_to_remove_there_is_nothing_to_explain():
     claims = {claim.sentence[:12]: claim.holds for claim in found.claims()}
     assert claims["The series e"] is None
     assert claims["The curves d"] is False
-    assert found.curves.bare > 0.02  # the steps allow no less
+    assert found.curves.rigid > 0.02  # the steps allow no less
     with pytest.raises(UnmeasuredError, match="so stiff a series element"):
         isovelocity(replace(quick, inertia=0.005), velocities=[1.0])
 

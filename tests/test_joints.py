@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.reference import simulate
+from mjhill.simulate.reference import simulate
 
 FINE = 1e-4  # [s]
 

@@ -7,7 +7,7 @@ import re
 import pytest
 
 import mjhill
-from mjhill.joints import parameter_file, read_joints
+from mjhill.joints.reader import parameter_file, read_joints
 
 
 @pytest.fixture

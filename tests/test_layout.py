@@ -6,8 +6,8 @@ from conftest import PLAIN_XML
 
 import mjhill
 from mjhill.comparison.native import native_spec
-from mjhill.layout import RATE_PARAMETERS, SLOTS
-from mjhill.spec import joint_spec
+from mjhill.engine.spec import joint_spec
+from mjhill.quantity import quantities
 
 
 def test_a_muscle_is_read_back_as_it_was_added(pair, elbow):
@@ -16,7 +16,7 @@ def test_a_muscle_is_read_back_as_it_was_added(pair, elbow):
 
 
 def test_a_written_muscle_is_read_back_whole(pair, muscle):
-    values = {name: 0.0123 * k for k, name in enumerate(SLOTS, 2)}
+    values = {name: 0.0123 * k for k, name in enumerate(mjhill.muscle_model("hill").slots, 2)}
     values |= {"electrical_stimulation": True, "eccentric_plateau": 1.4, "series_limit": 3.0}
     changed = dataclasses.replace(muscle, **values)
     mjhill.write_muscle(pair, "elbow_extensor", changed)
@@ -31,11 +31,25 @@ def test_passive_elasticity_is_read_back_as_it_was_written(pair, elbow):
     assert mjhill.read_passive(pair, "elbow") == changed
 
 
-def test_no_two_parameters_share_a_slot_and_the_gain_stays_silent():
-    assert len(set(SLOTS.values())) == len(SLOTS)
-    assert ("gainprm", 0) not in SLOTS.values()
-    assert ("dynprm", 0) not in SLOTS.values()
-    assert set(RATE_PARAMETERS) == set(SLOTS) - {"max_isometric_force"}
+@pytest.mark.parametrize("model", mjhill.MODELS, ids=lambda model: model.name)
+def test_no_two_parameters_share_a_slot_and_the_gain_stays_silent(model):
+    slots = list(model.slots.values())
+    assert len(set(slots)) == len(slots)
+    assert ("gainprm", 0) not in slots
+    assert ("dynprm", 0) not in slots
+    assert {name for name, _ in quantities(model.parameters)} <= set(model.slots)
+
+
+def test_files_made_before_are_read_as_they_were():
+    slots = mjhill.muscle_model("hill").slots
+    assert [name for name, (array, _) in slots.items() if array == "dynprm"] == [
+        "excitation_tau", "activation_tau", "deactivation_tau", "electrical_stimulation",
+        "activation_floor",
+    ]  # fmt: skip
+    assert slots["max_isometric_force"] == ("gainprm", 1)
+    assert slots["series_limit"] == ("gainprm", 7)
+    assert slots["max_velocity"] == ("biasprm", 0)
+    assert slots["velocity_activation"] == ("biasprm", 5)
 
 
 def test_an_unknown_muscle_lists_those_there_are(pair):

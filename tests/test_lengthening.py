@@ -7,11 +7,11 @@ from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.rig import muscle_torque
-from mjhill.experiments.paper.lengthening import lengthening
+from mjhill.experiments.lengthening import lengthening
+from mjhill.lab.rig import muscle_torque
 
 EVEN = replace(MUSCLE, width_short=50.0, width_long=50.0)  # as strong at any angle
-ONE = {"velocities": [3.0], "levels": [1.0]}
+ONE = {"velocities": [3.0], "excitations": [1.0]}
 
 
 def stretched(joint, **options):
@@ -26,13 +26,13 @@ def test_a_muscle_as_strong_at_any_angle_carries_hills_hyperbola_inverted(level)
     c = 0.3 * hill / (1 + hill)  # as steep at rest as when shortening
     w = velocity / MUSCLE.max_velocity
     wanted = 1 + 0.3 * w / (w + c) + MUSCLE.viscosity * w / level
-    found = stretched(make_joint(EVEN), levels=[level], amplitude=radians(60))
+    found = stretched(make_joint(EVEN), excitations=[level], amplitude=radians(60))
     assert found.end == pytest.approx(wanted, rel=2e-3)
-    assert found.own == pytest.approx(wanted, rel=1e-3)
+    assert found.contractile == pytest.approx(wanted, rel=1e-3)
 
 
 def test_a_higher_plateau_is_reached_and_is_not_the_papers():
-    found = lengthening(make_joint(replace(EVEN, eccentric_plateau=1.8)), levels=[1.0])
+    found = lengthening(make_joint(replace(EVEN, eccentric_plateau=1.8)), excitations=[1.0])
     assert found.stretches[1.0][-1].end > 1.5
     plateau, *_ = found.claims()
     assert not plateau.holds
@@ -108,11 +108,11 @@ def test_bad_options_are_refused():
             lengthening("elbow", velocities=[1.0, velocity])
     with pytest.raises(ValueError, match="velocities must be positive, got -1.0 rad/s"):
         lengthening("elbow", velocities=[-1.0])
-    with pytest.raises(ValueError, match="velocities must have at least one"):
+    with pytest.raises(ValueError, match="velocities must not be empty; give at least one"):
         lengthening("elbow", velocities=[])
     for amplitude in (0.0, -0.1, 3.0, float("nan")):
         with pytest.raises(ValueError, match=r"amplitude must be in \(0, 2.5\] rad"):
             lengthening("elbow", amplitude=amplitude)
     for level in (0.0, 1.1, float("nan")):
-        with pytest.raises(ValueError, match=r"levels must be inputs in \(0, 1\]"):
-            lengthening("elbow", levels=[0.5, level])
+        with pytest.raises(ValueError, match=r"excitations must be one or more in \(0, 1\]"):
+            lengthening("elbow", excitations=[0.5, level])

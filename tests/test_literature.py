@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.identification.agreement import published_rows, step_rows
-from mjhill.identification.free import free_parameters, value_of
-from mjhill.identification.identified import Identified
-from mjhill.identification.literature import from_literature
-from mjhill.identification.solve import Estimate
-from mjhill.identification.writing import parameter_text, rounded, write_parameters
-from mjhill.joints import parameter_file, read_joints
+from mjhill.identification.fit import Estimate, Identified, free_parameters, value_of
+from mjhill.identification.literature_fit import from_literature, published_rows, step_rows
+from mjhill.identification.report import parameter_text, rounded, write_parameters
+from mjhill.joints.reader import parameter_file, read_joints
 
 # what the joints as a whole do not reach
 OUTSIDE = {

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.mjcf import parameters_xml
-from mjhill.reference import rest_state
+from mjhill.engine.mjcf import parameters_xml
+from mjhill.simulate.reference import rest_state
 
 
 @pytest.mark.parametrize("name", list(mjhill.JOINTS))

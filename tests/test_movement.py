@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.experiments.bench.rig import rig, run, still
-from mjhill.identification.free import value_of
+from mjhill.identification.fit import value_of
 from mjhill.identification.measurement import Measurement, read_measurement
 from mjhill.identification.movement import from_measurements
-from mjhill.reference import plant_torque
+from mjhill.lab.rig import at_rest, build_rig, record_run
+from mjhill.simulate.reference import plant_torque
 
 NOISE = 0.003  # [rad], that of optical motion capture
 TORQUE_NOISE = 0.3  # [N·m]
@@ -34,10 +34,10 @@ def subject(elbow):
 
 def moved(subject, duration=0.8, excitation=None, torque=None):
     """A recorded movement: a pulse of the flexor and a push, by default."""
-    bench = rig(subject)
-    return run(
+    bench = build_rig(subject)
+    return record_run(
         bench,
-        still(bench, subject.home_angle),
+        at_rest(bench, subject.home_angle),
         duration,
         excitation=excitation or {"elbow_flexor": mjhill.pulse(0.6, 0.1, 0.3)},
         torque=torque or mjhill.pulse(3.0, 0.6, 0.1),
@@ -64,9 +64,9 @@ def measured(recording, pick=slice(None)):
 
 def held(subject, noise=TORQUE_NOISE, duration=0.5):
     """The elbow held still by a clamp whose torque is measured."""
-    bench = rig(subject, added_inertia=1e9)  # no muscle turns it in the time of a run
+    bench = build_rig(subject, added_inertia=1e9)  # no muscle turns it in the time of a run
     pulse = mjhill.pulse(0.6, 0.1, 0.3)
-    recording = run(bench, still(bench, 1.3), duration, excitation={"elbow_flexor": pulse})
+    recording = record_run(bench, at_rest(bench, 1.3), duration, excitation={"elbow_flexor": pulse})
     muscles = recording["elbow_extensor.force"] - recording["elbow_flexor.force"]
     random = np.random.default_rng(1)
     torque = muscles - plant_torque(subject, 1.3) + noise * random.standard_normal(len(recording))

@@ -17,7 +17,7 @@ from mjhill.comparison.native import (
 )
 
 SLOW = dict(excitation_tau=0.03, activation_tau=0.012, deactivation_tau=0.05)
-MUSCLE = mjhill.Muscle(
+MUSCLE = mjhill.Hill(
     max_isometric_force=40.0,
     optimal_length=0.03,
     width_short=0.05,
@@ -48,7 +48,7 @@ PLANT = """
 """
 
 
-def plant(muscle: mjhill.Muscle = MUSCLE, **target: str) -> mujoco.MjSpec:
+def plant(muscle: mjhill.Hill = MUSCLE, **target: str) -> mujoco.MjSpec:
     spec = mujoco.MjSpec.from_string(PLANT)
     mjhill.add_muscle(spec, name="m", muscle=muscle, **(target or {"tendon": "path"}))
     return spec
@@ -133,7 +133,7 @@ def test_the_closed_form_of_the_native_delay_is_that_of_mujoco(level: float) -> 
 def test_the_delay_of_two_lags_is_where_their_step_response_is(
     excitation: float, activation: float
 ) -> None:
-    muscle = mjhill.Muscle(
+    muscle = mjhill.Hill(
         max_isometric_force=1.0,
         optimal_length=0.0,
         width_short=1.0,
@@ -158,7 +158,7 @@ def test_the_delay_of_two_lags_is_where_their_step_response_is(
 
 def test_electrical_stimulation_has_one_lag() -> None:
     values = {name: getattr(MUSCLE, name) for name in MUSCLE.__dataclass_fields__}
-    stimulated = mjhill.Muscle(**{**values, "electrical_stimulation": True})
+    stimulated = mjhill.Hill(**{**values, "electrical_stimulation": True})
     assert muscle_delay(stimulated, rising=True) == pytest.approx(0.012)
     assert muscle_delay(stimulated, rising=False) == pytest.approx(0.05)
 

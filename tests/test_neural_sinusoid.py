@@ -7,11 +7,11 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.frequency import octaves
-from mjhill.experiments.bench.rest import resting_angle
-from mjhill.experiments.paper.neural_sinusoid import NeuralSinusoid, neural_sinusoid
-from mjhill.reference import rest_state, simulate
-from mjhill.signals import constant, sinusoid
+from mjhill.analysis.frequency import octaves
+from mjhill.experiments.neural_sinusoid import NeuralSinusoid, neural_sinusoid
+from mjhill.lab.postures import resting_angle
+from mjhill.simulate.reference import rest_state, simulate
+from mjhill.simulate.signals import constant, sinusoid
 
 FEW = (0.5, 1.0, 2.0, 4.0, 8.0)
 

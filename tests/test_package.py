@@ -35,8 +35,8 @@ def test_the_wheel_alone_runs_the_elbow(tmp_path):
     assert moved == "True"
     assert (site / "mjhill" / "py.typed").exists()
     assert (site / "mjhill" / "models" / "elbow" / "elbow.xml").exists()
-    assert (site / "mjhill" / "reproduction" / "template.html").exists()
-    assert (site / "mjhill" / "reproduction" / "style.css").exists()
+    assert (site / "mjhill" / "report" / "template.html").exists()
+    assert (site / "mjhill" / "report" / "style.css").exists()
 
 
 def test_every_example_runs_and_prints_a_number_with_its_unit():

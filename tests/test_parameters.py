@@ -9,8 +9,8 @@ from types import MappingProxyType
 import pytest
 
 import mjhill
-from mjhill.parameters import quantities
-from mjhill.system import System
+from mjhill.joints.system import System
+from mjhill.quantity import quantities
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_every_number_of_a_joint_has_a_source(name):
 
 
 def _default(parameter):
-    (field,) = (f for f in dataclasses.fields(mjhill.Muscle) if f.name == parameter)
+    (field,) = (f for f in dataclasses.fields(mjhill.Hill) if f.name == parameter)
     return field.default
 
 

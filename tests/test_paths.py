@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.reference import rest_state, simulate
-from mjhill.spec import joint_spec, system_spec
-from mjhill.system import Coordinate, Movement, System
+from mjhill.engine.spec import joint_spec, system_spec
+from mjhill.joints.system import Coordinate, Movement, System
+from mjhill.simulate.reference import rest_state, simulate
 
 TIMESTEPS = (1e-3, 2e-3, 5e-3)
 HELD = Movement(lambda t: 1.3, lambda t: 0.0)

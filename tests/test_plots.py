@@ -5,10 +5,10 @@ import itertools
 import numpy as np
 import pytest
 
-from mjhill import plots
-from mjhill.plots import plot_overlay, plot_recording
-from mjhill.recording import Recording
-from mjhill.rendering.bellies import MUSCLE_COLOURS
+from mjhill.draw import plot as plots
+from mjhill.draw.bellies import MUSCLE_COLOURS
+from mjhill.draw.plot import plot_overlay, plot_recording
+from mjhill.simulate.recording import Recording
 
 TIME = np.linspace(0.0, 1.0, 50)
 UNITS = {

@@ -4,14 +4,14 @@ from types import MappingProxyType
 import pytest
 
 import mjhill
-from mjhill.experiments.bench.rig import muscle_torque, rig, run, still
-from mjhill.identification.published import (
+from mjhill.lab.rig import at_rest, build_rig, muscle_torque, record_run
+from mjhill.literature.published import (
     EndAngle,
     PassiveTorque,
     end_angles,
     passive_torques,
 )
-from mjhill.reference import plant_torque
+from mjhill.simulate.reference import plant_torque
 
 TORQUES = [item for name in mjhill.JOINTS for item in passive_torques(name)]
 ENDS = [item for name in mjhill.JOINTS for item in end_angles(name)]
@@ -97,8 +97,8 @@ def test_the_net_torque_is_zero_at_the_end_and_pushes_back_to_it(item):
 @pytest.mark.parametrize("muscle", ["elbow_flexor", "elbow_extensor"])
 def test_a_run_at_full_effort_ends_there(elbow, muscle):
     joint = replace(elbow, damping=2.0)  # damped well, so that it settles
-    bench = rig(joint)
-    recording = run(bench, still(bench, joint.rest_angle), 4.0, excitation={muscle: 1.0})
+    bench = build_rig(joint)
+    recording = record_run(bench, at_rest(bench, joint.rest_angle), 4.0, excitation={muscle: 1.0})
     end = EndAngle("elbow", muscle, 0.0, 1.0, "").measured(joint)
     assert recording["elbow.angle"][-1] == pytest.approx(end, abs=1e-3)  # of 1.2 rad
 

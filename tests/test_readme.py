@@ -10,13 +10,12 @@ import pytest
 from click.testing import CliRunner
 
 import mjhill
-from mjhill.bench import accuracy
+from mjhill.benchmarks import accuracy
 from mjhill.cli import main
-from mjhill.identification.agreement import published_rows
 from mjhill.identification.facts import facts
-from mjhill.identification.free import free_parameters, value_of
+from mjhill.identification.fit import free_parameters, value_of
+from mjhill.identification.literature_fit import published_rows
 from mjhill.identification.report import brief
-from mjhill.layout import SLOTS
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -99,7 +98,7 @@ def test_the_parameter_table_is_the_slot_table():
         slots = [int(first)] + ([int(second)] if second else [])
         for slot, name in zip(slots, re.findall(r"`(\w+)`", names), strict=False):
             found[name] = (array, slot)
-    assert found == SLOTS
+    assert found == mjhill.muscle_model("hill").slots
 
 
 def table_under(marker):

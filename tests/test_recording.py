@@ -14,7 +14,7 @@ import pytest
 from conftest import rest
 
 import mjhill
-from mjhill import recording_files
+from mjhill.simulate import recording_files
 
 
 @pytest.fixture

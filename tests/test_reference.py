@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.reference import rest_state, simulate
-from mjhill.spec import joint_spec
+from mjhill.engine.spec import joint_spec
+from mjhill.simulate.reference import rest_state, simulate
 
 CASES = {
     "step": ({"elbow_flexor": mjhill.step(0.5, 0.05)}, 0.0),
@@ -117,7 +117,7 @@ def test_reference_does_not_step_over_a_short_pulse(elbow):
 def test_reference_ends_at_the_balance_of_torques(elbow):
     final = simulate(elbow, {"elbow_flexor": 0.3}, duration=4.0, sample=0.1)
     total = final["elbow_flexor.force"][-1] - final["elbow_extensor.force"][-1]
-    from mjhill.reference import plant_torque
+    from mjhill.simulate.reference import plant_torque
 
     assert total + plant_torque(elbow, final["elbow.angle"][-1]) == pytest.approx(0.0, abs=1e-4)
 

@@ -11,9 +11,9 @@ import numpy as np
 import psutil
 import pytest
 
-from mjhill.recording import Recording
-from mjhill.rendering import View, render, snapshot
-from mjhill.rendering.bellies import activation_colour, drawn_muscles, muscle_shapes, present_look
+from mjhill.draw import View, render, snapshot
+from mjhill.draw.bellies import activation_colour, drawn_muscles, muscle_shapes, present_look
+from mjhill.simulate.recording import Recording
 
 ELBOW = Path(__file__).parent.parent / "models" / "elbow"
 SMALL = {"size": (320, 240), "fps": 10}
@@ -250,7 +250,7 @@ def test_a_dead_encoder_is_reported_and_leaves_no_file(elbow, tmp_path):
 def test_a_full_disk_is_reported_and_leaves_no_file(tmp_path):
     program = (
         "import resource, mujoco, numpy as np\n"
-        "from mjhill.recording import Recording; from mjhill.rendering import View, render\n"
+        "from mjhill.simulate.recording import Recording; from mjhill.draw import View, render\n"
         "m = mujoco.MjModel.from_xml_string('<mujoco/>')\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (300, 300))\n"
         f"path = {str(tmp_path / 'a.mp4')!r}\n"
@@ -306,7 +306,7 @@ def test_a_snapshot_without_a_recording_shows_the_home_key(elbow, tmp_path):
 
 def test_rendering_needs_no_screen_and_no_setting():
     program = (
-        "import mujoco; from mjhill.rendering import snapshot\n"
+        "import mujoco; from mjhill.draw import snapshot\n"
         f"m = mujoco.MjModel.from_xml_path({str(ELBOW / 'scene.xml')!r})\n"
         "print(snapshot(m, size=(64, 64)).std() > 5)"
     )
@@ -316,7 +316,7 @@ def test_rendering_needs_no_screen_and_no_setting():
 
 def test_a_machine_without_opengl_is_told_what_to_install():
     program = (
-        "import mujoco; from mjhill.rendering import snapshot\n"
+        "import mujoco; from mjhill.draw import snapshot\n"
         f"m = mujoco.MjModel.from_xml_path({str(ELBOW / 'scene.xml')!r})\n"
         "try: snapshot(m, size=(64, 64))\n"
         "except RuntimeError as error: print(error)"

@@ -4,7 +4,7 @@ import browser
 import pytest
 from small_experiments import entry
 
-from mjhill.reproduction import report_of, reproduce, write_report
+from mjhill.report import report_of, reproduce, write_report
 
 pytestmark = pytest.mark.skipif(
     browser.find() is None, reason="no Chromium or Chrome; apt-get install chromium"

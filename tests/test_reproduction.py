@@ -17,11 +17,10 @@ from small_experiments import HOSTILE, entry
 
 import mjhill
 from mjhill.cli import main
-from mjhill.reproduction import CATALOGUE, Entry, report_of, reproduce, select, write_report
-from mjhill.reproduction.fingerprint import sources
-from mjhill.reproduction.part import film_speed
-from mjhill.reproduction.process import uninterrupted
-from mjhill.reproduction.words import difference, duration, number, published
+from mjhill.report import CATALOGUE, Entry, fingerprint, report_of, reproduce, select, write_report
+from mjhill.report.page import difference, duration, number, published
+from mjhill.report.part import film_speed
+from mjhill.report.process import uninterrupted
 
 TESTS = Path(__file__).parent
 
@@ -130,10 +129,18 @@ def test_a_changed_experiment_is_run_again_and_what_is_older_not_shown(tmp_path,
     assert outcome.parts[0][1]["options"]["level"] == 0.4
 
 
-def test_the_sources_of_an_experiment_reach_down_to_the_equations():
-    names = {path.name for path in sources("mjhill.experiments.paper.twitch")}
-    assert {"twitch.py", "rig.py", "elements.py", "compiled.py"} <= names
-    assert "reproduce.py" not in names
+def test_any_source_or_data_file_of_the_package_counts(tmp_path, monkeypatch):
+    shutil.copytree(TESTS.parent / "mjhill", tmp_path / "mjhill")
+    monkeypatch.setattr(fingerprint, "_PACKAGE", tmp_path / "mjhill")
+    words = []
+    for changed in (None, "elements.py", "engine/compiled.py", "literature/facts.toml"):
+        if changed is not None:
+            with open(tmp_path / "mjhill" / changed, "a", encoding="utf-8") as file:
+                file.write("\n")
+        fingerprint._own.cache_clear()
+        words.append(fingerprint.fingerprint("mjhill.experiments.twitch"))
+    fingerprint._own.cache_clear()
+    assert len(set(words)) == len(words)
 
 
 @pytest.mark.parametrize(
@@ -163,7 +170,7 @@ INTERRUPTED = """
 import sys
 from small_experiments import entry
 from mjhill.interrupts import handled
-from mjhill.reproduction import report_of, reproduce, write_report
+from mjhill.report import report_of, reproduce, write_report
 catalogue = (entry("rise"), entry("endless"), entry("rise", id="last"))
 with handled():
     outcome = reproduce(sys.argv[1], catalogue=catalogue, jobs=1)
@@ -174,16 +181,17 @@ sys.exit(outcome.exit_code)
 
 def ended(folder, number, whole_group):
     """Exit code and words of a run that gets a signal while a part is at work in a process."""
+    at_work = folder.with_name(f"{folder.name}.at_work")
     process = subprocess.Popen(
         [sys.executable, "-c", INTERRUPTED, str(folder)],
-        env={**os.environ, "PYTHONPATH": f"{TESTS}:{TESTS.parent}"},
+        env={**os.environ, "PYTHONPATH": f"{TESTS}:{TESTS.parent}", "AT_WORK": str(at_work)},
         start_new_session=True,  # a group of its own, to which Ctrl-C goes as in a terminal
         stderr=subprocess.PIPE,
         text=True,
     )
     try:
         until = time.monotonic() + 60
-        while not list(folder.glob(".endless*")):
+        while not at_work.exists():
             assert time.monotonic() < until
             assert process.poll() is None
             time.sleep(0.05)
@@ -318,7 +326,7 @@ def test_the_catalogue_has_the_joints_it_names_and_each_experiment_once():
     assert len({entry.id for entry in CATALOGUE}) == len(CATALOGUE)
     for part in select(CATALOGUE):
         assert part.joint in mjhill.JOINTS
-        assert part.entry.path == f"mjhill.experiments.paper.{part.entry.id}:{part.entry.id}"
+        assert part.entry.path == f"mjhill.experiments.{part.entry.id}:{part.entry.id}"
 
 
 def test_an_experiment_that_needs_its_own_joints_is_left_out_or_refused_on_others():
@@ -347,7 +355,7 @@ def test_unknown_names_end_in_exit_code_2_and_write_nothing(tmp_path, arguments,
 
 
 def test_the_command_runs_an_experiment_of_the_paper_once(tmp_path):
-    pytest.importorskip("mjhill.experiments.paper.tetanus")
+    pytest.importorskip("mjhill.experiments.tetanus")
     command = ["reproduce", "--only", "tetanus", "--joint", "eye", "--no-video", "-o", "out"]
     first = CliRunner().invoke(main, [*command, "--json"])
     assert first.exit_code == 0, first.stderr

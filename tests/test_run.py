@@ -4,11 +4,11 @@ import pytest
 from conftest import rest
 
 import mjhill
-from mjhill.callbacks.python import control
-from mjhill.readings import shortening_velocity, tension
-from mjhill.spec import joint_spec
+from mjhill.engine.python import excitation
+from mjhill.engine.spec import joint_spec
+from mjhill.muscles.readings import shortening_velocity, tension
 
-STRONG = mjhill.Muscle(
+STRONG = mjhill.Hill(
     max_isometric_force=100.0,
     optimal_length=0.0,
     width_short=0.2,
@@ -171,7 +171,7 @@ def test_a_recorded_input_is_the_one_that_the_muscle_gets(pair):
             with mjhill.installed():
                 run = mjhill.record(pair, data, duration=0.001, excitation=inputs)
             for index, name in enumerate(inputs):
-                assert run[f"{name}.u"][-1] == control(pair, data, index)
+                assert run[f"{name}.u"][-1] == excitation(pair, data, index)
 
 
 def test_a_delayed_input_is_recorded_when_it_arrives(elbow):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from mjhill import elements, scheme
+from mjhill import elements
+from mjhill.muscles import hill, scheme
 
 CE = dict(max_velocity=20.0, hill=0.3, plateau=1.3, slope_ratio=1.0, viscosity=1e-3)
 SE = dict(stretch_max=0.3, shape=3.0, limit=2.0)
@@ -193,7 +194,7 @@ def test_electrical_stimulation_skips_the_lag_of_excitation():
         for stimulated in (0.0, 1.0):
             n, a, s = 0.0, 0.0, 0.0
             for _ in range(5):
-                rates = scheme.muscle_rates(
+                rates = hill.rates(
                     staged, 1.0, n, a, s, 0.0, 0.0, 1e-3, *parameters, stimulated, *rest
                 )
                 n, a, s = (x + 1e-3 * r for x, r in zip((n, a, s), rates, strict=True))
@@ -257,9 +258,7 @@ def test_excitation_and_activation_stay_inside_0_and_1_under_rk4(stimulated):
         taus = np.exp(random.uniform(math.log(1e-6), 0, 3)).tolist()
 
         def rates(n, a, u, taus=taus):
-            found = scheme.muscle_rates(
-                True, u, n, a, 0.0, 0.0, 0.0, dt, *taus, stimulated, 1e-3, *muscle
-            )
+            found = hill.rates(True, u, n, a, 0.0, 0.0, 0.0, dt, *taus, stimulated, 1e-3, *muscle)
             return np.array(found[:2])
 
         state = np.array([0.0, 0.0])
@@ -277,7 +276,7 @@ def test_excitation_and_activation_stay_inside_0_and_1_under_rk4(stimulated):
 def test_the_shortest_time_constants_overflow_nothing_under_stimulation():
     muscle = (0.0, 0.5, 0.5, 0.1, 3.0, 2.0, 6.0, 0.3, 1.3, 1.0, 1e-3, 0.0)
     for n, a in ((0.5, 0.5), (1.0, 0.0), (0.0, 1.0)):
-        rates = scheme.muscle_rates(
+        rates = hill.rates(
             False, 0.7, n, a, 0.0, 0.01, 0.0, 1e-2, 1e-6, 1e-6, 1e-6, 1.0, 1e-3, *muscle
         )
         assert all(map(math.isfinite, rates))

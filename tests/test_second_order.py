@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mjhill.identification.second_order import fit_step, step_response
+from mjhill.analysis.second_order import fit_step, step_response
 
 TIME = np.arange(2001) * 1e-3
 

@@ -3,9 +3,8 @@ import itertools
 import numpy as np
 import pytest
 
-from mjhill.identification import solve as solver
-from mjhill.identification.free import Free
-from mjhill.identification.solve import solve
+from mjhill.identification import fit as solver
+from mjhill.identification.fit import Free, solve
 
 FREE = [Free((name,), 1.0, 9.0) for name in ("first", "second", "third")]
 

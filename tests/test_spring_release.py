@@ -7,10 +7,9 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.posture import balanced
-from mjhill.experiments.bench.rig import UnmeasuredError
-from mjhill.experiments.paper.spring_release import spring_release
-from mjhill.experiments.trials.spring_trial import release
+from mjhill.experiments.spring_release import release, spring_release
+from mjhill.lab.postures import balancing_excitations
+from mjhill.lab.rig import UnmeasuredError
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +55,7 @@ def test_muscle_torques_change_though_inputs_do_not(elbow):
 
 def test_without_cocontraction_a_stiffer_spring_rings_faster():
     joint = mjhill.JOINTS["elbow"]
-    inputs = balanced(joint, 0.02, joint.home_angle)
+    inputs = balancing_excitations(joint, 0.02, joint.home_angle)
     frequencies = [
         release(joint, k, 0.02, inputs, joint.home_angle, 0.1, 0.5).swing.natural_frequency
         for k in (20.0, 80.0)
@@ -70,10 +69,10 @@ def test_claims_follow_from_the_releases(elbow):
     assert damped.holds is (not over)
     assert f"not underdamped in {len(over)} of 9" in damped.evidence
     assert rising.holds
-    calm = tuple(one for one in elbow.releases if one.level == 0.02)
+    calm = tuple(one for one in elbow.releases if one.cocontraction == 0.02)
     assert next(replace(elbow, releases=calm).claims()).holds
     weak = tuple(
-        replace(one, swing=replace(one.swing, stiffness=one.spring + 3.0 + 0.1 * one.level))
+        replace(one, swing=replace(one.swing, stiffness=one.spring + 3.0 + 0.1 * one.cocontraction))
         for one in elbow.releases
     )
     assert list(replace(elbow, releases=weak).claims())[1].holds is False
@@ -85,19 +84,21 @@ def test_claims_follow_from_the_releases(elbow):
 
 def test_a_level_that_is_not_held_is_reported():
     soft = (0.5,)  # less than the wrist's muscles take away
-    result = spring_release("wrist", angle=0.0, levels=(0.02, 0.5), springs=soft, duration=0.3)
-    assert [one.level for one in result.releases] == [0.02]
+    result = spring_release(
+        "wrist", angle=0.0, cocontraction=(0.02, 0.5), springs=soft, duration=0.3
+    )
+    assert [one.cocontraction for one in result.releases] == [0.02]
     assert any("drifts away" in measure.note for measure in result.measures())
     assert list(result.claims())[1].holds is None
     with pytest.raises(UnmeasuredError, match="drifts away"):
-        spring_release("wrist", angle=0.0, levels=(0.5, 0.6), springs=soft)
+        spring_release("wrist", angle=0.0, cocontraction=(0.5, 0.6), springs=soft)
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"joint": "tail"}, "unknown joint 'tail'; there are: elbow"),
-        ({"levels": (0.2,)}, "levels must be 2 or more ascending"),
+        ({"cocontraction": (0.2,)}, "cocontraction must be 2 or more ascending"),
         ({"springs": (-1.0,)}, "springs must be 1 or more ascending"),
         ({"springs": (30.0, 20.0)}, "springs must be 1 or more ascending"),
         ({"angle": -1.0}, "angle must be in the range of elbow"),
@@ -112,7 +113,7 @@ def test_bad_options_are_refused(options, message):
 
 def test_the_figure_the_film_and_the_numbers_are_there(elbow):
     shares = []
-    result = spring_release("eye", levels=(0.02, 0.5), duration=0.2, progress=shares.append)
+    result = spring_release("eye", cocontraction=(0.02, 0.5), duration=0.2, progress=shares.append)
     assert shares[-1] == 1.0
     figure = Figure(figsize=result.size)
     result.draw(figure)

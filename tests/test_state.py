@@ -5,7 +5,7 @@ from conftest import rest
 
 import mjhill
 from mjhill.elements import velocity_scale
-from mjhill.spec import joint_spec
+from mjhill.engine.spec import joint_spec
 
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 

@@ -7,11 +7,10 @@ import pytest
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.variants import AS_IT_IS, FLAT, LINEAR
-from mjhill.experiments.paper.step import Step, step
-from mjhill.experiments.trials.step_fit import fitted_step
-from mjhill.identification.second_order import step_response
-from mjhill.reference import rest_state, simulate
+from mjhill.analysis.second_order import step_response
+from mjhill.experiments.step import Step, fitted_step, step
+from mjhill.lab.variants import AS_IT_IS, FLAT, LINEAR
+from mjhill.simulate.reference import rest_state, simulate
 
 
 @cache
@@ -37,7 +36,7 @@ def test_the_elbow_bears_out_what_the_paper_says_of_steps():
 def test_a_step_goes_where_the_stiff_solver_takes_it(elbow):
     one = elbow_step().steps[1]
     reference = simulate(
-        elbow, {one.muscle: one.level}, duration=0.5, start=rest_state(elbow, one.start)
+        elbow, {one.muscle: one.excitation}, duration=0.5, start=rest_state(elbow, one.start)
     )
     travel = reference["elbow.angle"] - one.start
     times = elbow_step().time
@@ -128,7 +127,7 @@ def test_an_unknown_joint_is_refused_with_those_there_are():
         step("shoulder")
 
 
-@pytest.mark.parametrize("levels", [(0.5,), (0.5, 0.1), (0.0, 0.5), (0.1, 1.5), (0.2, 0.2)])
-def test_levels_that_are_no_rising_inputs_are_refused(levels):
-    with pytest.raises(ValueError, match="levels must be at least two, ascending, in"):
-        step(levels=levels)
+@pytest.mark.parametrize("excitations", [(0.5,), (0.5, 0.1), (0.0, 0.5), (0.1, 1.5), (0.2, 0.2)])
+def test_excitations_that_do_not_rise_are_refused(excitations):
+    with pytest.raises(ValueError, match="excitations must be at least two, ascending, in"):
+        step(excitations=excitations)

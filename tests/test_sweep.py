@@ -3,9 +3,9 @@ import pytest
 from click.testing import CliRunner
 
 import mjhill
-from mjhill.bench import sweep
-from mjhill.bench.sweep import trial
-from mjhill.bench.sweep.cases import KINDS, draw
+from mjhill.benchmarks import sweep
+from mjhill.benchmarks.sweep import trial
+from mjhill.benchmarks.sweep.cases import KINDS, draw
 from mjhill.cli import main
 
 COUNT = 100

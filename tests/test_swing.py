@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from mjhill.comparison.responses import SecondOrder
-from mjhill.experiments.trials.swing import first_swing, second_order_response, swing_measures
+from mjhill.analysis.responses import SecondOrder
+from mjhill.analysis.swing import first_swing, second_order_response
+from mjhill.experiments.external_impulse import swing_measures
 
 
 def swung(stiffness, damping, inertia=0.1, width=0.02, duration=2.0):
@@ -26,7 +27,7 @@ def test_a_second_order_system_is_found_again(stiffness, damping):
     swing = swung(stiffness, damping)
     assert swing.stiffness == pytest.approx(stiffness, rel=0.01)
     assert swing.damping == pytest.approx(damping, rel=0.01)
-    assert swing.found_inertia == pytest.approx(0.1, rel=0.01)
+    assert swing.fitted_inertia == pytest.approx(0.1, rel=0.01)
     assert swing.misfit < 0.005
     assert swing.natural_frequency == pytest.approx(
         np.sqrt(stiffness / 0.1) / (2 * np.pi), rel=0.01
@@ -57,7 +58,7 @@ def test_a_system_that_runs_away_has_no_natural_frequency():
 
 
 def test_an_inertia_that_no_limb_has_is_not_seen():
-    found = replace(swung(10.0, 0.4), found_inertia=-0.01)
+    found = replace(swung(10.0, 0.4), fitted_inertia=-0.01)
     measures = {measure.name: measure for measure in swing_measures("x", found)}
-    assert measures["inertia J, found, x"].value is None
-    assert "none above 0" in measures["inertia J, found, x"].note
+    assert measures["fitted inertia J, x"].value is None
+    assert "none above 0" in measures["fitted inertia J, x"].note

@@ -10,10 +10,10 @@ def test_the_heads_and_their_equivalent_move_the_joint_alike():
     assert result.muscle in mjhill.JOINTS["elbow"].muscles
     torque = sum(head.max_isometric_force for head in result.heads.values())
     assert result.equivalent.max_isometric_force == pytest.approx(torque, rel=1e-3)
-    assert result.together.shape == result.alone.shape == result.time.shape
+    assert result.with_heads.shape == result.with_equivalent.shape == result.time.shape
     # the extensor takes the joint the other way from flexion
-    assert result.together[-1] < result.together[0] - 0.5
-    assert result.together == pytest.approx(result.alone, abs=0.02)
+    assert result.with_heads[-1] < result.with_heads[0] - 0.5
+    assert result.with_heads == pytest.approx(result.with_equivalent, abs=0.02)
     assert all(claim.holds for claim in result.claims())
 
 
@@ -26,5 +26,5 @@ def test_the_figure_has_the_two_panels_of_the_paper():
 
 
 def test_a_joint_without_the_anatomy_is_refused():
-    with pytest.raises(ValueError, match="synergists of 'knee' is not there; there are: elbow"):
+    with pytest.raises(ValueError, match="synergists of 'knee'; there is one for: elbow"):
         experiments.synergists("knee")

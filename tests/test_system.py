@@ -4,9 +4,9 @@ import pytest
 from made_joint import MUSCLE, make_joint
 
 import mjhill
-from mjhill.reference import rest_state, simulate
-from mjhill.spec import joint_spec, system_spec
-from mjhill.system import Coordinate, Movement, System
+from mjhill.engine.spec import joint_spec, system_spec
+from mjhill.joints.system import Coordinate, Movement, System
+from mjhill.simulate.reference import rest_state, simulate
 
 SLIDE = System(
     name="slide",

@@ -1,8 +1,8 @@
 import pytest
 
 import mjhill
-from mjhill.identification import table2 as module
-from mjhill.identification.table2 import rows_of, table2
+from mjhill.literature import table2 as module
+from mjhill.literature.table2 import rows_of, table2
 
 
 def printed_plants():

@@ -29,7 +29,7 @@ SLIPPING = """
 def arm(angles):
     """A muscle over a cylinder at a joint with a range [rad]; it slips off the cylinder at 101°."""
     spec = mujoco.MjSpec.from_string(SLIPPING.format(range=angles))
-    muscle = mjhill.Muscle(
+    muscle = mjhill.Hill(
         max_isometric_force=700, optimal_length=0.0, width_short=0.08, width_long=0.08,
         max_velocity=0.8, hill_shape=0.25, series_stretch=0.008, excitation_tau=0.035,
         activation_tau=0.01, deactivation_tau=0.04,

@@ -6,8 +6,8 @@ import pytest
 from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
 
-from mjhill.experiments.bench.rig import muscle_torque
-from mjhill.experiments.paper.tetanus import tetanus
+from mjhill.experiments.tetanus import tetanus
+from mjhill.lab.rig import muscle_torque
 
 
 def contraction(muscle=MUSCLE, **changes):
@@ -37,14 +37,14 @@ def test_the_steady_level_is_the_torque_at_mid_range_of_the_largest_over_the_ran
     assert found.best["puller"] == pytest.approx(-0.6, abs=0.1)
     assert found.best["opponent"] == pytest.approx(0.6, abs=0.1)
     level = muscle_torque(joint, "puller", 1.0, 0.0) / muscle_torque(joint, "puller", 1.0, -0.6)
-    assert found.voluntary["puller"].level == pytest.approx(level, rel=0.01)
+    assert found.voluntary["puller"].steady == pytest.approx(level, rel=0.01)
     *_, below = found.claims()
     assert below.holds
 
 
 def test_at_its_best_angle_mid_range_gives_the_largest_torque_and_decides_nothing():
     found = tetanus(make_joint())
-    assert found.voluntary["puller"].level == pytest.approx(1.0)
+    assert found.voluntary["puller"].steady == pytest.approx(1.0)
     assert found.largest["puller"] == pytest.approx(10.0, rel=0.01)
     *_, below = found.claims()
     assert below.holds is None

@@ -8,10 +8,10 @@ import pytest
 from conftest import rest
 
 import mjhill
-from mjhill import scripted
-from mjhill.bench.sweep import cases, trial
-from mjhill.layout import muscle_names
-from mjhill.spec import joint_spec
+from mjhill.benchmarks.sweep import cases, trial
+from mjhill.engine.layout import muscle_names
+from mjhill.engine.spec import joint_spec
+from mjhill.simulate import scripted
 
 # the tendon leaves the wrapping geom at 1.06 rad and is 2 cm longer from one step to the next
 SLIPS = """
@@ -27,7 +27,7 @@ SLIPS = """
   <tendon><spatial name="tendon"><site site="origin"/><geom geom="wrap"/>
     <site site="insertion"/></spatial></tendon>
 </mujoco>"""
-PULLER = mjhill.Muscle(
+PULLER = mjhill.Hill(
     max_isometric_force=781.0,
     optimal_length=0.07,
     width_short=0.05,

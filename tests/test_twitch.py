@@ -7,15 +7,15 @@ from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.bench.dynamometry import (
+from mjhill.experiments.twitch import twitch
+from mjhill.lab.dynamometer import (
     active_torque,
-    machine_giving_way,
-    runs,
+    compliant_machine,
+    electrically_stimulated,
+    run_paths,
     stiff_machine,
-    stimulated,
 )
-from mjhill.experiments.bench.rig import UnmeasuredError, muscle_torque
-from mjhill.experiments.paper.twitch import twitch
+from mjhill.lab.rig import UnmeasuredError, muscle_torque
 
 # --- the dynamometer
 
@@ -26,7 +26,7 @@ def test_a_joint_steady_on_a_dynamometer_stays_and_its_torque_is_that_of_muscle_
 ):
     joint = make_joint()
     path = np.full(300, 0.4)
-    found = runs(
+    found = run_paths(
         joint, stiff_machine(joint), path, before={"puller": level}, excitation={"puller": level}
     )
     assert np.ptp(found.angle) < 1e-9
@@ -51,14 +51,14 @@ def test_active_torque_is_the_muscles_own_once_elasticity_is_taken_off(muscle):
 def test_a_machine_gives_way_by_no_more_than_it_says():
     joint = make_joint()
     for deflection in (radians(0.2), radians(5.0)):
-        machine = machine_giving_way(joint, deflection)
-        found = runs(joint, machine, np.zeros(1500), excitation={"puller": 1.0})
+        machine = compliant_machine(joint, deflection)
+        found = run_paths(joint, machine, np.zeros(1500), excitation={"puller": 1.0})
         assert 0.9 * deflection < np.ptp(found.angle) <= deflection
 
 
 def test_a_light_joint_gets_a_machine_that_the_steps_can_follow():
     joint = make_joint(inertia=5e-5)
-    found = runs(joint, stiff_machine(joint), np.zeros(1000), excitation={"puller": 1.0})
+    found = run_paths(joint, stiff_machine(joint), np.zeros(1000), excitation={"puller": 1.0})
     assert np.isfinite(found.torque).all()
     assert (np.diff(found.torque[0]) > -1e-3).all()  # rises without ringing
 
@@ -69,7 +69,7 @@ def test_the_reading_of_a_relaxed_turn_has_the_inertia_of_the_limb():
     joint = make_joint(limp, stiffness=0.0, damping=0.0, passive=nothing)
     machine = stiff_machine(make_joint())
     time = 1e-3 * np.arange(500)
-    found = runs(joint, machine, 0.5 * 8.0 * time**2 - 0.5)
+    found = run_paths(joint, machine, 0.5 * 8.0 * time**2 - 0.5)
     assert found.torque[0, 400] == pytest.approx(-joint.inertia * 8.0, rel=1e-3)
 
 
@@ -107,7 +107,9 @@ def test_without_neural_excitation_to_bypass_nothing_is_gained():
     joint = make_joint(replace(MUSCLE, excitation_tau=1e-6))
     *_, faster = twitch(joint).claims()
     assert not faster.holds
-    assert all(muscle.electrical_stimulation for muscle in stimulated(joint).muscles.values())
+    assert all(
+        muscle.electrical_stimulation for muscle in electrically_stimulated(joint).muscles.values()
+    )
 
 
 def test_published_twitches_stand_beside_those_of_the_ankle_only():

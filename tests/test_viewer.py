@@ -11,7 +11,7 @@ import pytest
 from screen import open_screen, wait_for
 
 import mjhill
-from mjhill.rendering.viewer import Player
+from mjhill.draw.viewer import Player
 
 SPACE, MINUS, EQUAL, BACKSPACE, RIGHT, LEFT = 32, 45, 61, 259, 262, 263
 

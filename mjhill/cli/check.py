@@ -26,9 +26,9 @@ def check(model: str, as_json: bool) -> None:
     Exit code 0: nothing, or notes only; 3: something makes results meaningless; 2: the model is
     refused.
     """
-    from mjhill.checks import check_model
-    from mjhill.models import load
-    from mjhill.tendons import check_tendons
+    from mjhill.engine.checks import check_model
+    from mjhill.engine.tendons import check_tendons
+    from mjhill.simulate.load import load
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # severe findings are in the table
@@ -62,8 +62,7 @@ def _looked_at(model: mujoco.MjModel) -> dict[str, str | int]:
     """What was checked, in words for people."""
     import mujoco
 
-    from mjhill.describe import elastic_joints
-    from mjhill.layout import muscle_ids, muscle_names
+    from mjhill.engine.layout import elastic_joints, muscle_ids, muscle_names
 
     muscles = muscle_ids(model)
     on_tendons = int((model.actuator_trntype[muscles] == int(mujoco.mjtTrn.mjTRN_TENDON)).sum())

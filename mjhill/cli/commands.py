@@ -82,7 +82,7 @@ def demo(output: Path, as_json: bool) -> None:
 @json_option
 def list_(as_json: bool) -> None:
     """List the joints that come with mjhill."""
-    from mjhill.joints import JOINTS
+    from mjhill.joints.reader import JOINTS
 
     rows = [
         {
@@ -104,11 +104,12 @@ def list_(as_json: bool) -> None:
 @json_option
 def info(model: str, mjcf: bool, as_json: bool) -> None:
     """Show the parameters of MODEL, a joint's name or a path, with units and sources."""
-    from mjhill.describe import gravity, rows
-    from mjhill.mjcf import snippet
+    from mjhill.cli.describe import gravity, rows
+    from mjhill.engine.mjcf import snippet
+    from mjhill.simulate.load import load
 
     if mjcf:
-        click.echo(snippet(model))
+        click.echo(snippet(load(model)))
         return
     print_table(rows(model), as_json, title=model)
     if not as_json:
@@ -229,7 +230,7 @@ def bench(
     fuzz, 100,000 models with anything that is accepted (5 minutes); checks, sound and unsound
     models past check_model (3 minutes); endurance, 10⁸ steps (2 minutes).
     """
-    from mjhill import bench as benchmarks
+    from mjhill import benchmarks
 
     long = names[0] if len(names) == 1 and names[0] in benchmarks.LONG else ""
     if (count or kind or case) and not long:
@@ -306,9 +307,9 @@ def _film(
     **video: Any,
 ) -> None:
     """Run a model from its home pose, write what ``files`` names and print what came out."""
-    from mjhill import scripted
     from mjhill.files import check_writable
-    from mjhill.models import load
+    from mjhill.simulate import scripted
+    from mjhill.simulate.load import load
 
     for kind, path in files.items():
         if path.suffix not in _SUFFIXES[kind]:
@@ -325,11 +326,11 @@ def _film(
     if "recording" in files:
         recording.save(files["recording"])
     if "plot" in files:
-        from mjhill.plots import plot_recording
+        from mjhill.draw.plot import plot_recording
 
         plot_recording(recording, files["plot"], title=model)
     if "video" in files:
-        from mjhill.rendering import View, render
+        from mjhill.draw import View, render
 
         with progress_bar("filming") as progress:
             render(
@@ -353,7 +354,7 @@ def _check_frames(duration: float, fps: float, speed: float) -> None:
 
 def _parse(items: tuple[str, ...]) -> dict[str, Any]:
     """Signals from ``NAME=LEVEL[@START[:END]]``."""
-    from mjhill.signals import Signal, as_signal, pulse, step
+    from mjhill.simulate.signals import Signal, as_signal, pulse, step
 
     signals: dict[str, Signal] = {}
     for item in items:
@@ -380,7 +381,7 @@ def _parse(items: tuple[str, ...]) -> dict[str, Any]:
 def _summary(
     recording: Any, files: dict[str, Path], replaced: Collection[Path], as_json: bool
 ) -> None:
-    from mjhill.scripted import summary
+    from mjhill.simulate.scripted import summary
 
     numbers = summary(recording)
     if as_json:

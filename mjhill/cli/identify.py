@@ -79,7 +79,7 @@ def identify(
 
 
 def _known(joints: tuple[str, ...], parameters: Path | None) -> list[str]:
-    from mjhill.joints import read_joints
+    from mjhill.joints.reader import read_joints
 
     known = read_joints(parameters)
     for name in joints:
@@ -89,13 +89,21 @@ def _known(joints: tuple[str, ...], parameters: Path | None) -> list[str]:
 
 
 def _published(names: list[str], parameters: Path | None, files: dict[str, Path]) -> dict[str, Any]:
-    from mjhill.identification.agreement import published_rows, step_rows
     from mjhill.identification.facts import facts
-    from mjhill.identification.literature import check_evidence, from_literature
-    from mjhill.identification.plots import plot_literature
-    from mjhill.identification.report import estimate_rows, fact_rows, markdown
-    from mjhill.identification.writing import write_parameters
-    from mjhill.joints import read_joints
+    from mjhill.identification.literature_fit import (
+        check_evidence,
+        from_literature,
+        published_rows,
+        step_rows,
+    )
+    from mjhill.identification.report import (
+        estimate_rows,
+        fact_rows,
+        markdown,
+        plot_literature,
+        write_parameters,
+    )
+    from mjhill.joints.reader import read_joints
 
     check_evidence(names, parameters)
     results = []
@@ -132,10 +140,13 @@ def _measured(
 ) -> dict[str, Any]:
     from mjhill.identification.measurement import read_measurement
     from mjhill.identification.movement import from_measurements
-    from mjhill.identification.plots import plot_predictions
-    from mjhill.identification.report import estimate_rows, prediction_rows
-    from mjhill.identification.writing import write_parameters
-    from mjhill.joints import read_joints
+    from mjhill.identification.report import (
+        estimate_rows,
+        plot_predictions,
+        prediction_rows,
+        write_parameters,
+    )
+    from mjhill.joints.reader import read_joints
 
     del files["page"]
     joint = read_joints(parameters)[name]

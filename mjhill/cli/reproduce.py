@@ -53,8 +53,8 @@ def reproduce(
     its sources or parameters have changed. The exit code is 1 where something failed and 130
     after an interruption; what was finished by then is kept, and reported.
     """
-    from mjhill.reproduction import CATALOGUE, report_of, select, write_report
-    from mjhill.reproduction import reproduce as run
+    from mjhill.report import CATALOGUE, report_of, select, write_report
+    from mjhill.report import reproduce as run
 
     parts = len(select(CATALOGUE, only, joints))
     print_line(f"{parts} of {len(select(CATALOGUE))} parts; {LENGTH}", err=True)

@@ -15,8 +15,8 @@ def view(model: str, paused: bool, speed: float) -> None:
     Space runs or pauses, the right arrow steps while paused, the left arrow goes back, Backspace
     restarts, - and = change the speed. Ctrl-C, or closing the window, ends it.
     """
-    from mjhill.models import load
-    from mjhill.rendering import view as show
+    from mjhill.draw import view as show
+    from mjhill.simulate.load import load
 
     loaded = load(model)
     show(loaded, paused=paused, speed=speed)

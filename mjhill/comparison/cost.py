@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.comparison.native import compiled, converted, native_spec, read_spec
-from mjhill.install import Backend, installed
-from mjhill.layout import muscle_names
-from mjhill.parameters import Muscle
-from mjhill.run import check_warnings
+from mjhill.engine.install import Backend, installed
+from mjhill.engine.layout import muscle_names
+from mjhill.muscles.hill import Hill
+from mjhill.simulate.run import check_warnings
 
 _INTEGRATORS = tuple(mujoco.mjtIntegrator.__members__.values())
 _DRIVE = 0.3  # control of the muscle that is on, the others are at a tenth of it
@@ -153,7 +153,7 @@ def bare_spec(spec: mujoco.MjSpec) -> mujoco.MjSpec:
         ValueError: The model has no muscle of ours.
     """
 
-    def convert(actuator: mujoco.MjsActuator, muscle: Muscle, length0: float) -> None:
+    def convert(actuator: mujoco.MjsActuator, muscle: Hill, length0: float) -> None:
         del length0
         gear = -float(actuator.gear[0]) * muscle.max_isometric_force
         actuator.set_to_motor()

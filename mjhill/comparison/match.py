@@ -16,8 +16,9 @@ from mjhill.comparison.native import (
     native_spec,
     read_spec,
 )
-from mjhill.layout import address, muscle_names, read_muscle
-from mjhill.parameters import Muscle
+from mjhill.engine.layout import address, muscle_names, read_muscle
+from mjhill.muscles import hill_of
+from mjhill.muscles.hill import Hill
 
 _PART = 0.5  # control at which the size dependence of MuJoCo's activation is shown
 
@@ -59,7 +60,7 @@ def matching(model: str | Path) -> tuple[Match, ...]:
     rows: list[Match] = []
     for name in muscle_names(ours):
         units = _units(ours, name)
-        muscle, other = read_muscle(ours, name), read_native(native, name)
+        muscle, other = hill_of(read_muscle(ours, name)), read_native(native, name)
         rows += _matched(name, muscle, other, _optimum(native, name), units)
         rows += _unmatched(name, muscle, other, units)
     return tuple(rows)
@@ -98,7 +99,7 @@ def _units(model: mujoco.MjModel, name: str) -> tuple[str, str]:
 
 
 def _matched(
-    name: str, ours: Muscle, native: NativeMuscle, optimum: float, units: tuple[str, str]
+    name: str, ours: Hill, native: NativeMuscle, optimum: float, units: tuple[str, str]
 ) -> list[Match]:
     force, length = units
     unit, half = native.unit_length, math.sqrt(math.log(2))
@@ -139,9 +140,7 @@ def _matched(
     return [Match(name, *row) for row in rows]
 
 
-def _unmatched(
-    name: str, ours: Muscle, native: NativeMuscle, units: tuple[str, str]
-) -> list[Match]:
+def _unmatched(name: str, ours: Hill, native: NativeMuscle, units: tuple[str, str]) -> list[Match]:
     hill = ours.hill_shape
     rise = native_delay(_PART, rising=True) * native.activation_tau
     no = "not matched: "

@@ -17,11 +17,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from mjhill.install import without_python_callbacks
-from mjhill.joints import JOINTS
-from mjhill.layout import actuator_names, addresses, is_muscle, read_muscle
-from mjhill.models import load, model_path
-from mjhill.parameters import Muscle
+from mjhill.engine.install import without_python_callbacks
+from mjhill.engine.layout import actuator_names, addresses, is_muscle, read_muscle
+from mjhill.joints.reader import JOINTS
+from mjhill.muscles import hill_of
+from mjhill.muscles.hill import Hill
+from mjhill.simulate.load import load, model_path
 
 _LMIN = 0.5  # MuJoCo's default; it fixes the unit of length, not the curve
 _UNUSED = 1.0  # scale and fpmax: without effect here, but the compiler wants them positive
@@ -53,7 +54,7 @@ class NativeMuscle:
     deactivation_tau: float
 
 
-def native_muscle(muscle: Muscle) -> NativeMuscle:
+def native_muscle(muscle: Hill) -> NativeMuscle:
     """The parameters of MuJoCo's muscle that come nearest to ours.
 
     Its bump is half as high midway between the optimum and either end, so the ends lie twice as
@@ -74,7 +75,7 @@ def native_muscle(muscle: Muscle) -> NativeMuscle:
     )
 
 
-def muscle_delay(muscle: Muscle, *, rising: bool) -> float:
+def muscle_delay(muscle: Hill, *, rising: bool) -> float:
     """Time [s] our activation takes for 1 - 1/e of the way after a step of the control.
 
     The lags in series are linear both ways, so the size of the step does not matter.
@@ -134,7 +135,7 @@ def native_spec(spec: mujoco.MjSpec) -> mujoco.MjSpec:
         ValueError: The model has no muscle of ours.
     """
 
-    def convert(actuator: mujoco.MjsActuator, muscle: Muscle, length0: float) -> None:
+    def convert(actuator: mujoco.MjsActuator, muscle: Hill, length0: float) -> None:
         native = native_muscle(muscle)
         optimum = length0 + muscle.optimal_length
         ends = [(end - 1) * native.unit_length for end in (native.lmin, native.lmax)]
@@ -157,7 +158,7 @@ def native_spec(spec: mujoco.MjSpec) -> mujoco.MjSpec:
 
 def converted(
     spec: mujoco.MjSpec,
-    convert: Callable[[mujoco.MjsActuator, Muscle, float], None],
+    convert: Callable[[mujoco.MjsActuator, Hill, float], None],
     *,
     states: int,
 ) -> mujoco.MjSpec:
@@ -173,8 +174,8 @@ def converted(
         ValueError: The model has no muscle of ours.
     """
     model, result = compiled(spec), spec.copy()
-    muscles: Mapping[str, tuple[Muscle, float]] = {
-        name: (read_muscle(model, name), float(model.actuator_length0[at.out]))
+    muscles: Mapping[str, tuple[Hill, float]] = {
+        name: (hill_of(read_muscle(model, name)), float(model.actuator_length0[at.out]))
         for name, at in addresses(model)
     }
     if not muscles:

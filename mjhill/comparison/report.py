@@ -37,7 +37,7 @@ def write(
         OSError: A file cannot be written.
         RuntimeError: There is nothing to render or encode the video with.
     """
-    from mjhill.plots import plot_overlay
+    from mjhill.draw.plot import plot_overlay
 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -60,7 +60,7 @@ def write(
 def _write_video(
     comparison: Comparison, path: Path, progress: Callable[[float], None] | None
 ) -> Path:
-    from mjhill.rendering import View, render
+    from mjhill.draw import View, render
 
     spec = read_spec(comparison.model)
     models = {"mjhill": compiled(spec), "native": compiled(native_spec(spec))}

@@ -1,29 +1,26 @@
-"""Experiments on a joint: what a laboratory does to it, done to its model.
+"""Experiments on a joint: what a laboratory does to a joint, done to its model.
 
-``mjhill.experiments.twitch("ankle")`` and its like run an experiment of the paper through MuJoCo
-and return what was measured, what the paper says of it and a figure; see ``Result``.
+``mjhill.experiments.twitch("ankle")`` and the others run an experiment of the paper through MuJoCo.
+They return what was measured, the paper's claims with what decides them, and a figure; see
+``Result``.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
+# all here and now: a function and its module have the same name, and the function must win
+from mjhill.experiments.external_impulse import external_impulse as external_impulse
+from mjhill.experiments.external_sinusoid import external_sinusoid as external_sinusoid
+from mjhill.experiments.free_pulse import free_pulse as free_pulse
+from mjhill.experiments.isotonic import isotonic as isotonic
+from mjhill.experiments.isovelocity import isovelocity as isovelocity
+from mjhill.experiments.lengthening import lengthening as lengthening
+from mjhill.experiments.neural_sinusoid import neural_sinusoid as neural_sinusoid
 from mjhill.experiments.result import Claim as Claim
 from mjhill.experiments.result import Measure as Measure
 from mjhill.experiments.result import Result as Result
-
-if TYPE_CHECKING:
-    from mjhill.experiments.paper.external_impulse import external_impulse as external_impulse
-    from mjhill.experiments.paper.external_sinusoid import external_sinusoid as external_sinusoid
-    from mjhill.experiments.paper.free_pulse import free_pulse as free_pulse
-    from mjhill.experiments.paper.isotonic import isotonic as isotonic
-    from mjhill.experiments.paper.isovelocity import isovelocity as isovelocity
-    from mjhill.experiments.paper.lengthening import lengthening as lengthening
-    from mjhill.experiments.paper.neural_sinusoid import neural_sinusoid as neural_sinusoid
-    from mjhill.experiments.paper.spring_release import spring_release as spring_release
-    from mjhill.experiments.paper.step import step as step
-    from mjhill.experiments.paper.synergists import synergists as synergists
-    from mjhill.experiments.paper.tetanus import tetanus as tetanus
-    from mjhill.experiments.paper.twitch import twitch as twitch
+from mjhill.experiments.spring_release import spring_release as spring_release
+from mjhill.experiments.step import step as step
+from mjhill.experiments.synergists import synergists as synergists
+from mjhill.experiments.tetanus import tetanus as tetanus
+from mjhill.experiments.twitch import twitch as twitch
 
 NAMES = (
     "synergists",
@@ -39,10 +36,3 @@ NAMES = (
     "spring_release",
     "external_sinusoid",
 )
-
-
-def __getattr__(name: str) -> Any:
-    # an experiment is imported when it is asked for: some read what others are made of
-    if name in NAMES:
-        return getattr(import_module(f"mjhill.experiments.paper.{name}"), name)
-    raise AttributeError(f"no experiment {name!r}; there are: {', '.join(NAMES)}")

@@ -1,4 +1,4 @@
-"""What an experiment gives: measures, the paper's claims decided, a figure, a run to film."""
+"""The result of an experiment: measures, verdicts on the paper's claims, a figure, a film."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from dataclasses import asdict, dataclass
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-from mjhill.recording import Recording
+from mjhill.simulate.recording import Recording
 
 
 def spoken(text: str) -> str:
-    """A text with its identifiers in words: ``elbow flexor``; ``V_max`` stays as it is."""
+    """A text with its identifiers as words: ``elbow flexor``. ``V_max`` stays as it is."""
     return re.sub(r"(?<=[a-z0-9])_(?=[a-z0-9])", " ", text)
 
 
 @dataclass(frozen=True)
 class Measure:
-    """A measured quantity, beside a published one where there is one.
+    """A measured quantity, with the published one where there is one.
 
-    Name and note are for people to read: identifiers in them become words, see ``spoken``.
+    People read name and note, so their identifiers become words, see ``spoken``.
 
     Attributes:
         name: What it is, such as ``time to peak of the dorsiflexor's twitch``.
-        value: As measured; None where it was not seen.
+        value: The measured value; None where it could not be measured.
         unit: Its unit.
-        published: Lower and upper end of what is published; equal for a single number.
-        source: Where that comes from; ``paper`` for Winters & Stark (1987).
-        note: Why it was not seen, or what to mind.
+        published: Lower and upper end of the published values; equal for a single number.
+        source: Source of the published values; ``paper`` for Winters & Stark (1987).
+        note: Why there is no value, or what the reader should know about it.
     """
 
     name: str
@@ -40,19 +40,19 @@ class Measure:
     note: str = ""
 
     def __post_init__(self) -> None:
-        """Put identifiers into words."""
+        """Turn identifiers into words."""
         object.__setattr__(self, "name", spoken(self.name))
         object.__setattr__(self, "note", spoken(self.note))
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A sentence of the paper and what the experiment says to it.
+    """A claim of the paper and the experiment's verdict on it.
 
     Attributes:
         sentence: The claim, in one sentence.
         section: Where the paper makes it, such as ``4.1.3, Fig. 6``.
-        holds: Whether the experiment bears it out; None where it cannot tell.
+        holds: Whether the experiment confirms it; None where it cannot decide.
         evidence: The numbers that decide, with units; identifiers become words, see ``spoken``.
     """
 
@@ -62,19 +62,19 @@ class Claim:
     evidence: str
 
     def __post_init__(self) -> None:
-        """Put identifiers into words."""
+        """Turn identifiers into words."""
         object.__setattr__(self, "evidence", spoken(self.evidence))
 
 
 class Result(abc.ABC):
-    """The outcome of one experiment on one joint: a frozen dataclass of its own for each.
+    """The result of one experiment on one joint. Each experiment has its own frozen dataclass.
 
     Attributes:
-        title: Heading of its report, such as ``Isometric twitch``.
-        section: Where the paper has it, such as ``4.1.1, Fig. 5a``.
-        size: Width and height of its figure [inch].
+        title: Heading in the report, such as ``Isometric twitch``.
+        section: Section of the paper, such as ``4.1.1, Fig. 5a``.
+        size: Width and height of the figure [inch].
         joint: Name of the joint.
-        recordings: Runs behind it, by what they are; kept for who wants to look further.
+        recordings: Recorded runs by a short description, for a closer look.
     """
 
     title: ClassVar[str]
@@ -85,22 +85,22 @@ class Result(abc.ABC):
 
     @abc.abstractmethod
     def measures(self) -> Iterator[Measure]:
-        """What was measured."""
+        """The measured quantities."""
 
     @abc.abstractmethod
     def claims(self) -> Iterator[Claim]:
-        """The paper's claims, each decided by the numbers."""
+        """The paper's claims, each with a verdict from the numbers."""
 
     @abc.abstractmethod
     def draw(self, figure: Any) -> None:
         """Draw the paper's figure into a Matplotlib figure of ``size``."""
 
     def film(self) -> Recording | None:
-        """A run worth seeing, where movement is the point; names are those of the joint's model."""
+        """A run that is worth a film, or None; its names are those of the joint's model."""
         return None
 
     def as_dict(self) -> dict[str, Any]:
-        """Every number, ready for JSON."""
+        """All measures and claims, ready for JSON."""
         return {
             "title": self.title,
             "section": self.section,

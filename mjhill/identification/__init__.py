@@ -1,1 +1,6 @@
-"""Identification: parameters fitted to measured movement."""
+"""Parameters of a joint fitted to the literature, or to measurements of one person."""
+
+from mjhill.identification.fit import Estimate as Estimate
+from mjhill.identification.fit import Identified as Identified
+from mjhill.identification.joint_fit import identify as identify
+from mjhill.identification.movement import Prediction as Prediction

@@ -1,28 +1,24 @@
-"""Published facts about human joints that no fit uses as data, beside what a joint does.
+"""Published facts about human joints, beside what a joint does in simulation.
 
-They are in ``data/facts.toml``, each with the measure that shows it and its source; its head says
-which are not independent of the bounds that the fit was given.
+Every measure takes the joint and the muscle concerned, then its own arguments, and returns SI.
 """
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import pi
-from pathlib import Path
+from math import radians
 from types import MappingProxyType
-from typing import Any
 
-from mjhill.experiments.bench.rig import UnmeasuredError
-from mjhill.identification.measures import MEASURES
-from mjhill.joints import JOINTS
-from mjhill.parameters import Joint
+from mjhill.experiments.twitch import muscle_twitch
+from mjhill.joints.joint import Joint
+from mjhill.joints.reader import JOINTS
+from mjhill.lab.ballistic import BallisticMovement, ballistic_movement, free_velocity
+from mjhill.lab.impedance import held_impedance, passive_stiffness, stiffness_slope
+from mjhill.lab.rig import UnmeasuredError
+from mjhill.literature.facts import PER_SI, Entry, name_of, read_entries
 
-_DATA = Path(__file__).parent.parent / "data" / "facts.toml"
-_PER_SI = MappingProxyType(
-    {"°/s": 180 / pi, "ms": 1e3, "%": 1e2, "rad/s": 1, "N·m/rad": 1, "1/rad": 1, "-": 1}
-)
+Measure = Callable[..., float]
 
 
 @dataclass(frozen=True)
@@ -55,31 +51,75 @@ class Fact:
         return None if self.measured is None else self.low <= self.measured <= self.high
 
 
-@dataclass(frozen=True)
-class Entry:
-    """One entry of the file of facts: what is published, and how it is measured.
+def _ballistic(
+    joint: Joint, muscle: str, degrees: float, time: float, braked: bool
+) -> BallisticMovement:
+    amplitude = radians(degrees)
+    return ballistic_movement(joint, muscle, amplitude=amplitude, duration=time, braked=braked)
 
-    Attributes:
-        joint: Name of the joint.
-        muscle: The muscle concerned, the agonist of a movement.
-        measure: Its name in ``MEASURES``.
-        arguments: What that takes beside the joint and the muscle.
-        quantity: What is measured, in words.
-        unit: Unit of ``low`` and ``high``.
-        low: Lower end of the published interval.
-        high: Upper end.
-        source: Where the interval comes from.
-    """
 
-    joint: str
-    muscle: str
-    measure: str
-    arguments: Mapping[str, Any]
-    quantity: str
-    unit: str
-    low: float
-    high: float
-    source: str
+def _ballistic_peak_velocity(
+    joint: Joint, muscle: str, *, degrees: float, time: float, braked: bool = False
+) -> float:
+    return _ballistic(joint, muscle, degrees, time, braked).peak_velocity
+
+
+def _ballistic_duration(
+    joint: Joint,
+    muscle: str,
+    *,
+    degrees: float,
+    time: float,
+    threshold: float,
+    braked: bool = False,
+) -> float:
+    return _ballistic(joint, muscle, degrees, time, braked).duration(radians(threshold))
+
+
+def _twitch_contraction(joint: Joint, muscle: str) -> float:
+    return muscle_twitch(joint, muscle).contraction
+
+
+def _twitch_half_relaxation(joint: Joint, muscle: str) -> float:
+    return muscle_twitch(joint, muscle).half_relaxation
+
+
+def _twitch_share(joint: Joint, muscle: str) -> float:
+    return muscle_twitch(joint, muscle).share
+
+
+def _passive_stiffness(joint: Joint, _: str, *, degrees: float) -> float:
+    return passive_stiffness(joint, radians(degrees))
+
+
+def _held_stiffness(joint: Joint, muscle: str, *, share: float, degrees: float) -> float:
+    return held_impedance(joint, muscle, share=share, angle=radians(degrees)).stiffness
+
+
+def _held_damping_ratio(joint: Joint, muscle: str, *, share: float, degrees: float) -> float:
+    return held_impedance(joint, muscle, share=share, angle=radians(degrees)).damping_ratio
+
+
+def _stiffness_slope(
+    joint: Joint, muscle: str, *, shares: Sequence[float], degrees: float
+) -> float:
+    return stiffness_slope(joint, muscle, shares=shares, angle=radians(degrees))
+
+
+MEASURES: Mapping[str, Measure] = MappingProxyType(
+    {
+        "ballistic_peak_velocity": _ballistic_peak_velocity,
+        "ballistic_duration": _ballistic_duration,
+        "twitch_contraction": _twitch_contraction,
+        "twitch_half_relaxation": _twitch_half_relaxation,
+        "twitch_share": _twitch_share,
+        "free_velocity": free_velocity,
+        "passive_stiffness": _passive_stiffness,
+        "held_stiffness": _held_stiffness,
+        "held_damping_ratio": _held_damping_ratio,
+        "stiffness_slope": _stiffness_slope,
+    }
+)
 
 
 def facts(
@@ -112,54 +152,19 @@ def facts(
     return found
 
 
-def read_entries(path: str | Path = _DATA) -> list[Entry]:
-    """The entries of a file of facts; by default the one that comes with mjhill.
-
-    Raises:
-        ValueError: The file is not TOML, or an entry is incomplete, names a measure or unit that
-            does not exist, or has an interval that does not ascend.
-        FileNotFoundError: There is no such file.
-    """
-    text = Path(path).read_text(encoding="utf-8")
-    try:
-        entries = [Entry(**{"arguments": {}, **table}) for table in tomllib.loads(text)["fact"]]
-    except (KeyError, TypeError, ValueError) as error:
-        raise ValueError(f"{path}: not a file of facts: {error}") from None
-    for entry in entries:
-        _check_entry(entry)
-    return entries
-
-
-def _check_entry(entry: Entry) -> None:
-    for what, name, known in (
-        ("measure", entry.measure, MEASURES),
-        ("unit", entry.unit, _PER_SI),
-    ):
-        if name not in known:
-            raise ValueError(f"{_name(entry)}: unknown {what} {name!r}; there are: {list(known)}")
-    if not entry.low < entry.high:
-        raise ValueError(
-            f"{_name(entry)}: low must be below high, got {entry.low:g} and {entry.high:g}"
-        )
-
-
 def _check_muscle(entry: Entry, joint: Joint) -> None:
     if entry.muscle not in joint.muscles:
         raise ValueError(
-            f"{_name(entry)}: unknown muscle {entry.muscle!r}; there are: "
+            f"{name_of(entry)}: unknown muscle {entry.muscle!r}; there are: "
             f"{', '.join(joint.muscles)}"
         )
-
-
-def _name(entry: Entry) -> str:
-    return f"{entry.joint}, {entry.quantity}"
 
 
 def _fact(entry: Entry, joint: Joint) -> Fact:
     measured, note = None, ""
     try:
         value = MEASURES[entry.measure](joint, entry.muscle, **entry.arguments)
-        measured = _PER_SI[entry.unit] * value
+        measured = PER_SI[entry.unit] * value
     except UnmeasuredError as reason:
         note = str(reason)
     return Fact(

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.identification.columns import Column, Columns, read_columns
-from mjhill.identification.table import read_table
-from mjhill.parameters import Joint
+from mjhill.identification.columns import Column, Columns, read_columns, read_table
+from mjhill.joints.joint import Joint
 
 _LEAST_SAMPLES = 50
 _LEAST_DURATION = 0.1  # [s], two of the slowest time constants of a muscle

@@ -1,16 +1,25 @@
-"""An identification as rows of tables, and as a page."""
+"""What a fit found: tables, a page, pictures and a parameter file."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import degrees
+from pathlib import Path
 from typing import Any
 
-from mjhill.identification.agreement import published_rows, step_rows
+import numpy as np
+
+from mjhill.analysis.second_order import step_response
+from mjhill.draw.bellies import MUSCLE_COLOURS
+from mjhill.draw.plot import take_literally
+from mjhill.files import replacing
 from mjhill.identification.facts import Fact
-from mjhill.identification.identified import Identified
+from mjhill.identification.fit import Identified
+from mjhill.identification.literature_fit import Evidence, evidence_on, published_rows, step_rows
 from mjhill.identification.movement import Prediction
-from mjhill.parameters import Joint
+from mjhill.joints.joint import Joint
+from mjhill.joints.reader import parameter_file
+from mjhill.simulate.reference import plant_torque
 
 
 def estimate_rows(result: Identified) -> list[dict[str, Any]]:
@@ -122,8 +131,9 @@ def _cell(value: Any) -> str:
 _PREFACE = """# Joints beside the literature
 
 Written by `mjhill identify`, which fits the parameters that have bounds in
-`mjhill/data/joints.toml` to Table 2 of Winters & Stark (1987) and to published passive torques and
-ranges of motion (`mjhill/data/table2.csv`, `published.csv`). The bounds are what measurements on
+`mjhill/joints/joints.toml` to Table 2 of Winters & Stark (1987) and to published passive torques
+and ranges of motion (`table2.csv` and `published.csv` in `mjhill/literature`). The bounds are what
+measurements on
 relaxed joints and muscle geometry allow; nothing leaves them. Each fit has a prior, the middle of
 the bounds, so it has one answer and says how much of it came from the data. `mjhill info NAME`
 gives every source.
@@ -146,3 +156,153 @@ pulse of at most 1, through the time constants of eq. 12.""",
 the data and their stated errors, and that the model is right; `from the data` is the share of the
 prior's variance that the data took away, by the width of the interval.""",
 }
+
+
+_DPI = 110
+
+
+def plot_literature(joint: Joint, path: str | Path) -> None:
+    """Draw a joint's steps beside Table 2, and its passive torque beside published ones.
+
+    Raises:
+        ValueError: The path does not end in .png.
+        OSError: It cannot be written.
+    """
+    evidence = evidence_on(joint)
+    figure, panels = _figure(2 if evidence.steps else 1)
+    if evidence.steps:
+        _draw_steps(panels[0], evidence)
+    _draw_passive(panels[-1], evidence)
+    figure.suptitle(f"{joint.name}: identified, beside the literature")
+    _save(figure, path)
+
+
+def plot_predictions(joint: str, predictions: Sequence[Prediction], path: str | Path) -> None:
+    """Draw each measurement, what the fitted joint makes of its inputs, and these inputs.
+
+    Raises:
+        ValueError: The path does not end in .png.
+        OSError: It cannot be written.
+    """
+    figure, panels = _figure(len(predictions))
+    for axes, prediction in zip(panels, predictions, strict=True):
+        _draw_prediction(axes, prediction)
+    figure.suptitle(f"{joint}: measured and predicted")
+    _save(figure, path)
+
+
+def _figure(count: int) -> tuple[Any, list[Any]]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(max(5.2 * count, 8.0), 4.2), dpi=_DPI, layout="constrained")
+    return figure, list(figure.subplots(1, count, squeeze=False)[0])
+
+
+def _draw_steps(axes: Any, evidence: Evidence) -> None:
+    time = evidence.time
+    muscles = list(evidence.joint.muscles)
+    for (name, row), response in zip(
+        evidence.steps, evidence.responses([evidence.joint])[0], strict=True
+    ):
+        colour = MUSCLE_COLOURS[muscles.index(name) % 2]
+        axes.plot(time, np.degrees(response), color=colour, label=f"{name}, {row.level:g}")
+        wanted = degrees(row.magnitude) * step_response(time, *row.time_constants)
+        axes.plot(time, wanted, color=colour, linestyle="--", linewidth=1)
+    axes.plot([], [], color="grey", linestyle="--", linewidth=1, label="Table 2")
+    axes.set(title="Steps of input", xlabel="time [s]", ylabel="way from the start [°]")
+    axes.set_xlim(0, time[-1])
+    axes.set_ylim(bottom=0)
+    _finish(axes)
+
+
+def _draw_passive(axes: Any, evidence: Evidence) -> None:
+    joint = evidence.joint
+    low, high = joint.range
+    angle = np.linspace(low - 0.1, high + 0.1, 300)
+    torque = [plant_torque(joint, q) for q in angle.tolist()]
+    axes.plot(np.degrees(angle), torque, color="black", label="passive torque")
+    for index, item in enumerate(evidence.torques):
+        sign = -1 if item.angle > joint.rest_angle else 1
+        axes.plot(
+            [degrees(item.angle)] * 2, [sign * item.low, sign * item.high],
+            color="#2f8f4e", linewidth=5, alpha=0.6, solid_capstyle="butt",
+            label="published" if index == 0 else None,
+        )  # fmt: skip
+    for index, end in enumerate(joint.range):
+        label = "range of motion" if index == 0 else None
+        axes.axvline(degrees(end), color="grey", linestyle=":", label=label)
+    axes.set(title="Relaxed joint", xlabel=f"angle [°], {joint.positive} positive")
+    axes.set_ylabel("torque [N·m]")
+    axes.axhline(0, color="grey", linewidth=0.5)
+    _finish(axes)
+
+
+def _draw_prediction(axes: Any, prediction: Prediction) -> None:
+    time = prediction.measurement.time
+    scale, unit = (180 / np.pi, "°") if prediction.quantity == "angle" else (1.0, "N·m")
+    axes.plot(time, scale * prediction.measured, color="grey", linewidth=3, label="measured")
+    axes.plot(time, scale * prediction.predicted, color="black", label="predicted")
+    name = Path(prediction.measurement.source).name
+    axes.set(title=name, xlabel="time [s]", ylabel=f"{prediction.quantity} [{unit}]")
+    axes.set_xlim(time[0], time[-1])
+    inputs = axes.twinx()
+    for index, (muscle, values) in enumerate(prediction.measurement.excitation.items()):
+        colour = MUSCLE_COLOURS[index % 2]
+        inputs.fill_between(time, values, step="post", color=colour, alpha=0.25, linewidth=0)
+        axes.fill_between([], [], color=colour, alpha=0.25, label=muscle)
+    inputs.set(ylim=(0, 4), yticks=[0, 1], ylabel="input [-]")
+    inputs.yaxis.set_label_coords(1.06, 0.125)
+    _finish(axes)
+
+
+def _finish(axes: Any) -> None:
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize="small", frameon=True, framealpha=0.8)
+
+
+def _save(figure: Any, path: str | Path) -> None:
+    path = Path(path)
+    if path.suffix != ".png":
+        raise ValueError(f"plot {str(path)!r} must end in .png")
+    take_literally(figure)
+    with replacing(path) as partial:
+        figure.savefig(partial)
+
+
+_DIGITS = 4  # significant
+
+
+def parameter_text(results: Iterable[Identified], parameters: str | Path | None = None) -> str:
+    """The text of a parameter file with the values of some joints replaced by fitted ones.
+
+    Args:
+        results: The fitted joints.
+        parameters: The file to start from; by default the one that comes with mjhill.
+    """
+    import tomlkit
+
+    document = tomlkit.parse(Path(parameters or parameter_file()).read_text(encoding="utf-8"))
+    for result in results:
+        for free, estimate in zip(result.free, result.estimates, strict=True):
+            entry = document[result.joint.name]
+            for key in free.path:
+                entry = entry[key]  # type: ignore[index]
+            entry["value"] = rounded(estimate.value, free.low, free.high)  # type: ignore[index]
+    return tomlkit.dumps(document)
+
+
+def write_parameters(
+    path: str | Path, results: Iterable[Identified], parameters: str | Path | None = None
+) -> None:
+    """Write ``parameter_text`` to a file, whole or not at all.
+
+    Raises:
+        OSError: The folder is missing or cannot be written.
+    """
+    with replacing(path) as partial:
+        partial.write_text(parameter_text(results, parameters), encoding="utf-8")
+
+
+def rounded(value: float, low: float, high: float) -> float:
+    """A value to four significant digits, still inside its bounds."""
+    return min(max(float(f"{value:.{_DIGITS}g}"), low), high)

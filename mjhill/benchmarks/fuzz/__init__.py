@@ -1,0 +1,157 @@
+"""Random models with anything that is accepted: does one fail that no check has foretold?"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import asdict
+from typing import Any
+
+import mujoco
+
+from mjhill.benchmarks.fuzz.models import KINDS
+from mjhill.benchmarks.fuzz.trial import STEPS, STRONGEST, Outcome, run
+from mjhill.benchmarks.result import Result
+from mjhill.engine.install import installed
+
+COUNT = 100_000  # models in all
+SHOWN = 20  # silent failures that are named
+_CHUNK = 25
+
+Progress = Callable[[float], None]
+
+
+def measure(
+    kinds: Sequence[str] = (),
+    count: int | None = None,
+    case: str | None = None,
+    progress: Progress | None = None,
+) -> Result:
+    """How many random models fail, and how many of those without a finding.
+
+    Args:
+        kinds: Kinds of model; all without any.
+        count: Models in all.
+        case: One model instead, such as ``hinge:17``: what was found and what came.
+        progress: Called now and then with the share done, 0 to 1.
+
+    Raises:
+        ValueError: A kind or case is unknown.
+    """
+    if case is None:
+        return table(fuzz(kinds or KINDS, count or COUNT, progress=progress))
+    outcome = replay(case)
+    row = {name: _listed(value) for name, value in asdict(outcome).items()}
+    return Result(f"{case}: {outcome.verdict}", [row])
+
+
+def fuzz(
+    kinds: Sequence[str] = KINDS,
+    count: int = COUNT,
+    processes: int | None = None,
+    progress: Progress | None = None,
+) -> list[Outcome]:
+    """Run random models, ``count`` in all, in parallel.
+
+    Args:
+        kinds: Kinds of model.
+        count: Models in all; each kind has the same number of them, to one.
+        processes: Processes at a time; by default one a core. With 1, all is done in this one.
+        progress: Called now and then with the share done, 0 to 1.
+
+    Raises:
+        ValueError: A kind is unknown.
+    """
+    for kind in kinds:
+        if kind not in KINDS:
+            raise ValueError(f"unknown kind of model {kind!r}; there are: {', '.join(KINDS)}")
+    jobs = [(kinds[k % len(kinds)], k // len(kinds)) for k in range(count)]
+    outcomes: list[Outcome] = []
+    with installed():  # so that the machine code is in the cache before processes ask for it
+        if processes == 1:
+            with quiet():
+                return [run(*job) for job in jobs]
+    chunks = [jobs[first : first + _CHUNK] for first in range(0, count, _CHUNK)]
+    with (
+        tempfile.TemporaryDirectory() as folder,  # MuJoCo writes a log where it runs
+        ProcessPoolExecutor(processes, initializer=os.chdir, initargs=(folder,)) as pool,
+    ):
+        for found in pool.map(_outcomes, chunks):
+            outcomes += found
+            if progress is not None:
+                progress(len(outcomes) / count)
+    return outcomes
+
+
+def replay(case: str) -> Outcome:
+    """Run one model again, by the name that an outcome has, such as ``hinge:17``.
+
+    Raises:
+        ValueError: The name is not a kind and a number.
+    """
+    kind, _, number = case.partition(":")
+    if not number.isdecimal():
+        raise ValueError(f"a case is named KIND:NUMBER, such as {KINDS[0]}:17, got {case!r}")
+    with installed(), quiet():
+        return run(kind, int(number))
+
+
+def _outcomes(jobs: list[tuple[str, int]]) -> list[Outcome]:
+    with installed(), quiet():
+        return [run(*job) for job in jobs]
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Without a line for each warning of MuJoCo, which are counted in the data."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def table(outcomes: Sequence[Outcome]) -> Result:
+    """A row for each kind of model, and the silent failures with what replays them."""
+    groups: dict[str, list[Outcome]] = {}
+    for outcome in outcomes:
+        groups.setdefault(outcome.kind, []).append(outcome)
+    rows: list[dict[str, Any]] = [_row(kind, group) for kind, group in groups.items()]
+    if len(rows) > 1:
+        rows.append(_row("all", outcomes))
+    silent = [o for o in outcomes if o.verdict == "silent"]
+    warned = [
+        o
+        for o in outcomes
+        if o.verdict == "reported" and any(failure.startswith("WARN") for failure in o.failures)
+    ]
+    kinds = Counter(failure for o in outcomes for failure in o.failures)
+    notes = (
+        f"{STEPS} steps each; a failure: a warning of MuJoCo, a state that is not finite, n or a "
+        f"outside [0, 1], tension below 0 or above {STRONGEST:g} F_max; foretold: with a severe "
+        "finding of check_model or check_tendons, or an error of a check",
+        "reported: by mjhill.record, which names what no muscle can do and refuses what MuJoCo "
+        f"warns of; it warned of {len(warned)} of them",
+        "plant: MuJoCo warns of the same run without muscles and elasticities of ours too",
+        "failures: " + ", ".join(f"{name} {n}" for name, n in kinds.most_common()),
+        f"goal: none silent; there are {len(silent)}",
+        *(f"{', '.join(o.failures)}: mjhill bench fuzz --case {o.case}" for o in silent[:SHOWN]),
+    )
+    return Result(f"Random models, MuJoCo {mujoco.__version__}", rows, notes)
+
+
+def _row(kind: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    verdicts = Counter(outcome.verdict for outcome in outcomes)
+    row: dict[str, Any] = {"models": kind, "n": len(outcomes)}
+    for verdict in ("sound", "finding only", "foretold", "reported", "plant", "silent"):
+        row[verdict] = verdicts[verdict]
+    return row
+
+
+def _listed(value: Any) -> Any:
+    return "; ".join(value) if isinstance(value, tuple) else value

@@ -1,1 +1,0 @@
-"""MuJoCo's callbacks of the muscle, in plain Python and compiled from the same equations."""

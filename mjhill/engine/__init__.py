@@ -1,0 +1,1 @@
+"""Muscles in MuJoCo: where they live in a model, what is checked, and the callbacks."""

@@ -1,1 +1,0 @@
-"""The bench: a joint set up, held, driven and read."""

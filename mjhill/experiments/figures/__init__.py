@@ -1,1 +1,0 @@
-"""The figures of experiments, in the form of the paper's."""

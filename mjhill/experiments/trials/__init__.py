@@ -1,1 +1,0 @@
-"""Single trials on the bench, each with what is measured of it."""

@@ -1,0 +1,427 @@
+"""A least-squares fit of parameters within their bounds, with priors and intervals."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import exp, log
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import mujoco.minimize
+import numpy as np
+from numpy.typing import NDArray
+
+from mjhill.joints.joint import Joint
+from mjhill.joints.reader import parameter_file, read_joints
+
+DEVIATIONS = 2.0  # from the middle of the bounds to either
+_NOT_FITTED = ("gear", "range", "home_angle")  # conventions, which no data determine
+
+
+@dataclass(frozen=True)
+class Free:
+    """One free parameter.
+
+    Attributes:
+        path: Keys of its entry in a joint's table, such as
+            ``("muscles", "elbow_flexor", "max_velocity")``.
+        low: Lower bound, in the parameter's unit.
+        high: Upper bound.
+    """
+
+    path: tuple[str, ...]
+    low: float
+    high: float
+
+    @property
+    def name(self) -> str:
+        """Its name in tables: ``elbow_flexor.max_velocity``, ``passive.k1_pos``, ``damping``."""
+        return ".".join(self.path[1:] if self.path[0] == "muscles" else self.path)
+
+    def value(self, deviation: float) -> float:
+        """The value [the parameter's unit] some standard deviations from the middle."""
+        share = 0.5 + 0.5 * deviation / DEVIATIONS
+        if self.low > 0:
+            value = exp((1 - share) * log(self.low) + share * log(self.high))
+        else:
+            value = (1 - share) * self.low + share * self.high
+        return min(max(value, self.low), self.high)
+
+    def deviation(self, value: float) -> float:
+        """Standard deviations of a value from the middle: ``value`` inverted."""
+        if self.low > 0:
+            share = log(value / self.low) / log(self.high / self.low)
+        else:
+            share = (value - self.low) / (self.high - self.low)
+        return DEVIATIONS * (2 * share - 1)
+
+
+def free_parameters(joint: str, path: str | Path | None = None) -> list[Free]:
+    """The free parameters of a joint, in the order of the parameter file.
+
+    Args:
+        joint: Its name.
+        path: The parameter file; by default the one that comes with mjhill.
+
+    Raises:
+        ValueError: The file is not in order, there is no such joint, bounds are not two ascending
+            numbers that the value lies between or those of what cannot be fitted, or there are
+            none.
+    """
+    known = read_joints(path)
+    if joint not in known:
+        raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(known)}")
+    tables = tomllib.loads(Path(path or parameter_file()).read_text(encoding="utf-8"))
+    found = list(_entries(tables[joint], ()))
+    for free, value in found:
+        if free.path[-1] in _NOT_FITTED:
+            raise ValueError(f"{joint}: {free.name} cannot be fitted; remove its bounds")
+        if not free.low < free.high or not free.low <= value <= free.high:
+            raise ValueError(
+                f"{joint}: {free.name} must have ascending bounds about its value {value:g}, "
+                f"got [{free.low:g}, {free.high:g}]"
+            )
+    if not found:
+        raise ValueError(f"{joint}: no parameter has bounds, so there is none to fit; add some")
+    return [free for free, _ in found]
+
+
+def _entries(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[tuple[Free, float]]:
+    for name, entry in table.items():
+        if not isinstance(entry, dict):
+            continue
+        if "bounds" in entry:
+            low, high = entry["bounds"]
+            yield Free((*path, name), float(low), float(high)), entry["value"]
+        elif "value" not in entry:
+            yield from _entries(entry, (*path, name))
+
+
+def joint_at(joint: Joint, free: Sequence[Free], deviations: NDArray[np.float64]) -> Joint:
+    """A joint with its free parameters at some deviations, shape (P,), from their middles."""
+    values: dict[tuple[str, ...], float] = {
+        item.path: item.value(z) for item, z in zip(free, deviations.tolist(), strict=True)
+    }
+
+    def under(*path: str) -> dict[str, Any]:
+        return {key[-1]: value for key, value in values.items() if key[:-1] == path}
+
+    muscles = {
+        name: replace(muscle, **under("muscles", name)) for name, muscle in joint.muscles.items()
+    }
+    return replace(
+        joint,
+        **under(),
+        passive=replace(joint.passive, **under("passive")),
+        muscles=MappingProxyType(muscles),
+        postures=MappingProxyType({**joint.postures, **under("postures")}),
+    )
+
+
+def value_of(joint: Joint, free: Free) -> float:
+    """The value that a free parameter has in a joint, in the parameter's unit."""
+    node: Any = joint
+    for key in free.path:
+        node = node[key] if isinstance(node, Mapping) else getattr(node, key)
+    return float(node)
+
+
+_DIFFERENCE = 1e-5  # of a parameter, in its standard deviations, for derivatives
+_ITERATIONS = 200
+_NEAR = 1e-6  # of a bound, in standard deviations
+CONFIDENT = 1.96  # standard deviations to either side that hold 95 % of a normal distribution
+
+# residuals at K points, (P, K) -> (R, K), each in units of its own standard deviation
+Residuals = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One fitted parameter.
+
+    Attributes:
+        name: Its name, such as ``elbow_flexor.max_velocity``.
+        value: Its value, in the parameter's unit.
+        low: Lower end of the interval that holds it with 95 % confidence, given the bounds,
+            the data and their errors, and that the model is right.
+        high: Upper end.
+        bounds: What physiology allows.
+        informed: Share of the prior's variance that the data took away, 0 to 1, from the width of
+            the interval: near 0 the value is the prior's, near 1 the data's.
+        at_bound: Whether it ended on a bound.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    bounds: tuple[float, float]
+    informed: float
+    at_bound: bool
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The best deviations of the free parameters and what is known of them.
+
+    Attributes:
+        deviations: Shape (P,).
+        covariance: Of the deviations, shape (P, P); linear about the solution.
+        jacobian: Slopes of the residuals, then of the priors, shape (R + P, P).
+        cost: Half the sum of squares, priors included.
+    """
+
+    deviations: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    jacobian: NDArray[np.float64]
+    cost: float
+
+    @property
+    def ends(self) -> NDArray[np.float64]:
+        """Ends of the intervals of 95 % by the covariance, in deviations, shape (P, 2)."""
+        reach = CONFIDENT * np.sqrt(np.diag(self.covariance))
+        return np.stack([self.deviations - reach, self.deviations + reach], axis=1)
+
+    def estimates(
+        self, free: Sequence[Free], ends: NDArray[np.float64] | None = None
+    ) -> list[Estimate]:
+        """The parameters with their confidence.
+
+        Args:
+            free: The parameters; what was fitted besides, such as where a trial starts, comes
+                after them in the solution.
+            ends: Ends of their intervals in deviations, by default those of the covariance.
+        """
+        known = self.ends if ends is None else ends
+        return [
+            _estimate(item, z, low, high)
+            for item, z, (low, high) in zip(
+                free, self.deviations.tolist(), known.tolist(), strict=False
+            )
+        ]
+
+
+def _estimate(free: Free, deviation: float, low: float, high: float) -> Estimate:
+    spread = (high - low) / (2 * CONFIDENT)
+    return Estimate(
+        free.name,
+        free.value(deviation),
+        free.value(low),
+        free.value(high),
+        (free.low, free.high),
+        max(0.0, 1.0 - spread**2),
+        abs(deviation) > DEVIATIONS - _NEAR,
+    )
+
+
+def with_priors(residuals: Residuals) -> Residuals:
+    """Residuals and, after them, the deviations themselves, which the priors want to be zero."""
+    return lambda points: np.concatenate([residuals(points), points])
+
+
+def solve(
+    residuals: Residuals,
+    count: int,
+    progress: Callable[[float], None] | None = None,
+    start: NDArray[np.float64] | None = None,
+) -> Solution:
+    """Fit ``count`` free parameters.
+
+    Args:
+        residuals: What the data say; the priors are added here.
+        count: P, the number of free parameters.
+        progress: Called with the share done, 0 to 1, guessed from the steps so far.
+        start: Deviations to start from, shape (P,); by default the middles of the bounds.
+
+    Raises:
+        RuntimeError: The fit did not settle.
+    """
+    all_residuals = with_priors(residuals)
+
+    def report(trace: list[mujoco.minimize.IterLog]) -> None:
+        if progress:
+            progress(1.0 - 0.85 ** len(trace))
+
+    bounds = [np.full(count, -DEVIATIONS), np.full(count, DEVIATIONS)]
+    point, trace = mujoco.minimize.least_squares(
+        np.zeros(count) if start is None else start,
+        all_residuals,
+        bounds,
+        eps=_DIFFERENCE,
+        max_iter=_ITERATIONS,
+        verbose=mujoco.minimize.Verbosity.SILENT,
+        iter_callback=report,
+    )
+    if len(trace) >= _ITERATIONS:
+        raise RuntimeError(f"the fit did not settle in {_ITERATIONS} iterations")
+    point = point.reshape(count, 1)
+    found = all_residuals(point)
+    jacobian, _ = mujoco.minimize.jacobian_fd(
+        all_residuals, point, found, np.float64(_DIFFERENCE), 0, [b.reshape(-1, 1) for b in bounds]
+    )
+    covariance = np.linalg.inv(jacobian.T @ jacobian)
+    return Solution(point[:, 0], covariance, jacobian, 0.5 * float((found**2).sum()))
+
+
+_RISE = 0.5 * CONFIDENT**2  # of the cost, at the end of an interval
+_STRETCH = 1.5  # by which an end is moved at a time
+_STRETCHES = 8
+_CORRECTIONS = 6  # of the other parameters, at each place
+
+_Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A place in the space of parameters, on the way to one end of one interval.
+
+    Attributes:
+        index: The parameter whose end is looked for.
+        side: 0 for the lower end, 1 for the upper.
+        before: Deviations at the place before this one, shape (P,).
+        point: Deviations here, shape (P,).
+        found: Residuals here, shape (R,).
+        bends: Rank-one changes of the solution's Jacobian, as shapes (R,) and (P,).
+    """
+
+    index: int
+    side: int
+    before: _Values
+    point: _Values
+    found: _Values
+    bends: tuple[tuple[_Values, _Values], ...] = ()
+
+    @property
+    def cost(self) -> float:
+        """Half the sum of squares."""
+        return 0.5 * float(self.found @ self.found)
+
+
+def intervals(residuals: Residuals, solution: Solution, count: int) -> _Values:
+    """Ends of the intervals of 95 % of the first parameters, in deviations, shape (count, 2).
+
+    Never narrower than those of the covariance.
+
+    Args:
+        residuals: What was solved.
+        solution: Its solution.
+        count: Number of parameters whose intervals are wanted.
+    """
+    evaluate = with_priors(residuals)
+    ends = solution.ends[:count]
+    origin = solution.deviations
+    start = evaluate(origin[:, None])[:, 0]
+    level = 0.5 * float(start @ start) + _RISE
+    places = []
+    for index, side in np.argwhere(np.abs(ends) < DEVIATIONS).tolist():
+        # the others follow as the covariance says
+        way = solution.covariance[:, index] / solution.covariance[index, index]
+        end = origin + way * (ends[index, side] - origin[index])
+        places.append(_Place(index, side, origin, end, start))
+    for stretch in range(_STRETCHES if places else 0):
+        tried = [_further(place, origin) for place in places]
+        reached = _corrected(evaluate, solution, start, tried)
+        going = []
+        for place, new in zip(places, reached, strict=True):
+            if new.cost < level:
+                ends[new.index, new.side] = new.point[new.index]
+                if abs(new.point[new.index]) < DEVIATIONS:
+                    going.append(new)
+            elif stretch:
+                ends[new.index, new.side] = _between(place, new, level)
+        if not going:
+            break
+        places = going
+    return ends
+
+
+def _further(place: _Place, origin: _Values) -> _Place:
+    """Straight on from a place, to where the next end is tried."""
+    index = place.index
+    way = place.point - place.before
+    target = origin[index] + _STRETCH * (place.point[index] - origin[index])
+    target = min(max(target, -DEVIATIONS), DEVIATIONS)
+    point = place.point + (target - place.point[index]) / way[index] * way
+    point = np.clip(point, -DEVIATIONS, DEVIATIONS)
+    point[index] = target
+    return replace(place, before=place.point, point=point)
+
+
+def _corrected(
+    evaluate: Residuals, solution: Solution, start: _Values, places: Sequence[_Place]
+) -> list[_Place]:
+    """Places with the other parameters improved, by Gauss-Newton with Broyden's Jacobians."""
+    best: list[_Place] = []
+    tried = [place.point for place in places]
+    for _ in range(_CORRECTIONS + 1):
+        found = evaluate(np.stack(tried, axis=1)).T
+        now = []
+        for k, (point, values) in enumerate(zip(tried, found, strict=True)):
+            # the first is seen from the solution, where the Jacobian is known
+            last = best[k] if best else replace(places[k], point=solution.deviations, found=start)
+            change = point - last.point
+            off = values - last.found - _times(solution.jacobian, last.bends, change)
+            length = float(change @ change)
+            bends = last.bends if length == 0 else (*last.bends, (off / length, change))
+            new = replace(places[k], point=point, found=values, bends=bends)
+            now.append(new if not best or new.cost < last.cost else replace(last, bends=bends))
+        best = now
+        tried = [_improved(solution.jacobian, place) for place in best]
+    return [replace(place, bends=()) for place in best]
+
+
+def _times(jacobian: _Values, bends: Sequence[tuple[_Values, _Values]], change: _Values) -> _Values:
+    product = jacobian @ change
+    for left, right in bends:
+        product = product + left * float(right @ change)
+    return np.asarray(product)
+
+
+def _improved(jacobian: _Values, place: _Place) -> _Values:
+    """A point with less cost, were the residuals linear; the parameter in question is kept."""
+    others = np.delete(np.arange(place.point.size), place.index)
+    bent = jacobian[:, others]
+    for left, right in place.bends:
+        bent = bent + np.outer(left, right[others])
+    point = place.point.copy()
+    point[others] -= np.linalg.lstsq(bent, place.found, rcond=None)[0]
+    return np.clip(point, -DEVIATIONS, DEVIATIONS)
+
+
+def _between(inside: _Place, outside: _Place, level: float) -> float:
+    """Where the cost comes to the level between two places, if it is a parabola."""
+    a, b = inside.point[inside.index], outside.point[outside.index]
+    low, high, wanted = (
+        np.sqrt(max(cost - (level - _RISE), 0.0)) for cost in (inside.cost, outside.cost, level)
+    )
+    return float(a + (b - a) * (wanted - low) / (high - low))
+
+
+@dataclass(frozen=True)
+class Identified:
+    """A joint with its free parameters fitted.
+
+    Attributes:
+        joint: The fitted joint.
+        free: The parameters that were free.
+        estimates: Their values and confidence, in the same order.
+        predictions: What the fitted joint does in each measurement, see ``Prediction``; none for
+            a fit to the literature.
+    """
+
+    joint: Joint
+    free: tuple[Free, ...]
+    estimates: tuple[Estimate, ...]
+    predictions: tuple[Any, ...] = ()
+
+    def __str__(self) -> str:
+        """A line for each parameter: value, interval of 95 % confidence, share from the data."""
+        lines = [f"{self.joint.name}, fitted: value, 95 % interval, share from the data"]
+        for one in self.estimates:
+            lines.append(
+                f"{one.name}: {one.value:.4g}, {one.low:.3g} to {one.high:.3g}, {one.informed:.0%}"
+            )
+        return "\n".join(lines)

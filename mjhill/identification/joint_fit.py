@@ -1,0 +1,62 @@
+"""The fit of a joint as one function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from mjhill.identification.fit import Identified
+from mjhill.identification.literature_fit import from_literature
+from mjhill.identification.measurement import Measurement, read_measurement
+from mjhill.identification.movement import from_measurements
+from mjhill.joints.reader import read_joints
+
+
+def identify(
+    joint: str,
+    measurements: Sequence[str | Path | Measurement] = (),
+    *,
+    predict: str | Sequence[str] | None = None,
+    only: Sequence[str] = (),
+    parameters: str | Path | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Identified:
+    """Fit the parameters of a joint within their bounds, and say how sure each is.
+
+    Without measurements the fit is to Table 2 of Winters & Stark (1987) and to published passive
+    torques and ranges of motion. With measurements it is to these alone.
+
+    Args:
+        joint: The joint's name.
+        measurements: CSV files of one person, or measurements already read: time, angle, torque
+            and the excitation of each muscle; see ``docs/parameters.md``.
+        predict: ``angle`` or ``torque``, once for all measurements or once for each; by default
+            torque where the joint is held still, angle elsewhere.
+        only: Names of the parameters to fit; by default all that have bounds.
+        parameters: Parameter file with bounds; by default the one that comes with mjhill.
+        progress: Called with the share done, 0 to 1.
+
+    Returns:
+        The fitted joint, an estimate of each parameter, and the predictions of the measurements.
+
+    Raises:
+        ValueError: The joint is unknown, a measurement cannot be read, an option does not go
+            with the others, or nothing published on the joint comes with mjhill.
+        RuntimeError: The fit did not settle.
+    """
+    known = read_joints(parameters)
+    if joint not in known:
+        raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(known)}")
+    if not measurements:
+        if predict or only:
+            raise ValueError("predict and only need measurements; give them")
+        return from_literature(joint, parameters, progress)
+    read = [
+        one if isinstance(one, Measurement) else read_measurement(Path(one), known[joint])
+        for one in measurements
+    ]
+    result, predictions = from_measurements(
+        joint, read, predict=predict, only=only, parameters=parameters, progress=progress
+    )
+    return replace(result, predictions=tuple(predictions))

@@ -1,0 +1,1 @@
+"""Joints: an inertia, a passive elasticity and the muscles that move it."""

@@ -1,0 +1,168 @@
+"""A batch of rigs: many joints with different parameters, simulated together on all cores."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import mujoco.batch
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mjhill.engine.install import installed, without_python_callbacks
+from mjhill.engine.layout import NUSER_JNT, parameter_rows, passive_row
+from mjhill.engine.spec import joint_spec
+from mjhill.joints.joint import Joint
+from mjhill.lab.rig import UnmeasuredError
+from mjhill.muscles import steady_states
+
+CONTROL_AND_TORQUE = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+
+_Values = NDArray[np.float64]
+
+
+def joint_angles(
+    joints: Sequence[Joint],
+    *,
+    start: ArrayLike,
+    velocity: ArrayLike = 0.0,
+    before: ArrayLike = 0.0,
+    excitation: ArrayLike,
+    torque: ArrayLike = 0.0,
+    steps: int,
+    timestep: float = 1e-3,
+) -> _Values:
+    """Angle [rad] of each joint at every step, with the start, shape (N, steps + 1).
+
+    Args:
+        joints: N joints with the same muscles and gears; other numbers may differ.
+        start: Angle at time 0 [rad], broadcast to (N,).
+        velocity: Velocity at time 0 [rad/s], broadcast to (N,).
+        before: Excitation of each muscle before time 0, at which it starts steady [-], broadcast
+            to (N, muscles).
+        excitation: Excitation of each muscle over each step [-], broadcast to
+            (N, steps, muscles).
+        torque: External torque over each step [N·m], broadcast to (N, steps).
+        steps: Number of steps.
+        timestep: Length of a step [s].
+
+    Raises:
+        UnmeasuredError: MuJoCo warned that a simulation went bad.
+    """
+    muscles = len(joints[0].muscles)
+    inputs = np.empty((len(joints), steps, muscles + 1))
+    inputs[:, :, :muscles], inputs[:, :, muscles] = excitation, torque
+    result = np.empty((len(joints), steps + 1))
+    result[:, 0] = start
+    with installed():  # also while the batch is made: none can run with Python callbacks
+        batch = _batch(joints, start, velocity, before, timestep)
+        result[:, 1:] = batch.rollout(steps, inputs, CONTROL_AND_TORQUE)["qpos"][:, :, 0]
+    check_batch(batch, joints[0])
+    return result
+
+
+def driving_torques(
+    joints: Sequence[Joint],
+    *,
+    path: _Values,
+    before: ArrayLike = 0.0,
+    excitation: ArrayLike,
+    timestep: float = 1e-3,
+) -> _Values:
+    """External torque [N·m] that moves each joint along a path, shape (N, T).
+
+    The path is prescribed, as by a rigid clamp. The torque balances the joint's inertia, passive
+    torque and muscles.
+
+    Args:
+        joints: N joints, as in ``joint_angles``.
+        path: Angle at every step [rad], shape (T,).
+        before: As in ``joint_angles``.
+        excitation: Excitation of each muscle over each step [-], shape (T, muscles).
+        timestep: Length of a step [s].
+
+    Raises:
+        UnmeasuredError: MuJoCo warned that a simulation went bad.
+    """
+    # the mean velocity over the last step, which is what the muscles have experienced
+    speed = np.diff(path, prepend=path[0]) / timestep
+    acceleration = np.gradient(np.gradient(path, timestep), timestep)
+    inertial = np.outer([joint.inertia for joint in joints], acceleration)
+    result = np.empty((len(joints), len(path)))
+    inputs = np.asarray(excitation)
+    with installed():
+        # one thread: a single step takes less time than waking other threads
+        batch = _batch(joints, path[0], 0.0, before, timestep, threads=1)
+        qpos, qvel, ctrl = batch.qpos, batch.qvel, batch.ctrl
+        passive, muscles = batch.bind("qfrc_passive"), batch.bind("qfrc_actuator")
+        for step in range(len(path)):
+            qpos[:, 0], qvel[:, 0], ctrl[:] = path[step], speed[step], inputs[step]
+            batch.step()
+            result[:, step] = inertial[:, step] - passive[:, 0] - muscles[:, 0]
+    check_batch(batch, joints[0])
+    return result
+
+
+def _batch(
+    joints: Sequence[Joint],
+    start: ArrayLike,
+    velocity: ArrayLike,
+    before: ArrayLike,
+    timestep: float,
+    threads: int = 0,
+) -> mujoco.batch.Batch:
+    """One simulation for each joint, muscles steady at the start; 0 threads means one a core."""
+    spec = joint_spec(joints[0])
+    spec.option.timestep = timestep
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT  # the model has none
+    with without_python_callbacks():
+        model = spec.compile()
+    batch = mujoco.batch.Batch(model, nsim=len(joints), nthread=threads)
+    _expand(batch, joints)
+    batch.qpos[:, 0], batch.qvel[:, 0] = start, velocity
+    excitations = np.broadcast_to(before, (len(joints), len(joints[0].muscles)))
+    batch.act[:] = _steady_states(joints, batch.qpos[:, 0], excitations)
+    return batch
+
+
+def _expand(batch: mujoco.batch.Batch, joints: Sequence[Joint]) -> None:
+    """Set the parameters of each joint in its simulation."""
+    rows = {name: batch.expand(f"actuator_{name}") for name in ("dynprm", "gainprm", "biasprm")}
+    user, stiffness = batch.expand("jnt_user"), batch.expand("jnt_stiffness")
+    rest, damping = batch.expand("qpos_spring"), batch.expand("dof_damping")
+    inertia = batch.expand("body_inertia")
+    for i, joint in enumerate(joints):
+        for k, muscle in enumerate(joint.muscles.values()):
+            for name, row in parameter_rows(muscle).items():
+                rows[name][i, k] = row
+        user[i, 0, :NUSER_JNT] = passive_row(joint.passive)
+        stiffness[i, 0], rest[i, 0] = joint.stiffness, joint.rest_angle
+        damping[i, 0], inertia[i, 1] = joint.damping, joint.inertia
+    batch.set_const()  # computes the mass matrix from the inertia
+
+
+def check_batch(batch: mujoco.batch.Batch, joint: Joint) -> None:
+    """Refuse a batch in which MuJoCo warned: such a simulation stops or goes on from a reset state.
+
+    Raises:
+        UnmeasuredError: A simulation warned; the message has the warning's name and the joint.
+    """
+    warned = batch.warning[:, :, 1] > 0  # counts by simulation and kind
+    if warned.any():
+        kind = mujoco.mjtWarning(int(np.argmax(warned.any(axis=0)))).name
+        raise UnmeasuredError(
+            f"{joint.name}: MuJoCo warned '{kind.removeprefix('mjWARN_').lower()}' in "
+            f"{warned.any(axis=1).sum()} of {len(warned)} simulations; check parameters, torques "
+            "and timestep"
+        )
+
+
+def _steady_states(joints: Sequence[Joint], start: _Values, excitations: _Values) -> _Values:
+    """States of every muscle, steady at its excitation and the joint's start angle."""
+    act = []
+    for joint, angle, row in zip(joints, start.tolist(), excitations.tolist(), strict=True):
+        states: list[float] = []
+        for (name, muscle), u in zip(joint.muscles.items(), row, strict=True):
+            states += steady_states(muscle, u, joint.gears[name] * angle)
+        act.append(states)
+    return np.array(act)

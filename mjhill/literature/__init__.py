@@ -1,0 +1,1 @@
+"""Published values, and the readers of them."""

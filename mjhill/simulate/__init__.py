@@ -1,0 +1,1 @@
+"""Runs: inputs over time, recordings, and the reference solution."""
