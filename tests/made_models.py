@@ -100,48 +100,50 @@ MODEL = MuscleModel(
 '''
 
 RUN = """
-import sys, json, warnings
+import json, sys, warnings
 import mujoco, numpy as np
-import mujoco.batch
 import mjhill
 from mjhill.engine.spec import joint_spec
 from mjhill.engine.code_cache import cache_folder
 
-joint = mjhill.JOINTS["elbow"].with_muscles("cascade")
-flexor, extensor = joint.muscles
-model = joint_spec(joint).compile()
+
+def at_work(name):
+    joint = mjhill.JOINTS["elbow"].with_muscles(name)
+    flexor, extensor = joint.muscles
+    model = joint_spec(joint).compile()
+
+    def start():
+        data = mujoco.MjData(model)
+        data.qpos[0] = joint.home_angle
+        mjhill.equilibrate(model, data)
+        return data
+
+    found = {"na": model.na, "findings": len(mjhill.check_model(model))}
+    for integrator in ("implicitfast", "RK4"):
+        model.opt.integrator = getattr(mujoco.mjtIntegrator, "mjINT_" + integrator.upper())
+        runs = {}
+        for backend in ("compiled", "python"):
+            with mjhill.installed(backend):
+                run = mjhill.record(model, start(), duration=0.3, excitation={flexor: 0.2})
+                runs[backend] = run["elbow.angle"]
+        exact = mjhill.reference.simulate(joint, {flexor: 0.2}, duration=0.3)
+        found[integrator] = {
+            "apart": float(np.abs(runs["compiled"] - runs["python"]).max()),
+            "off": float(np.abs(runs["compiled"] - exact["elbow.angle"]).max()),
+            "moved": float(np.ptp(exact["elbow.angle"])),
+            "gap": mjhill.energy(run).gap,
+        }
+    with mjhill.installed():
+        data = mujoco.MjData(model)
+        data.ctrl[:] = 0.3, 0.1
+        mjhill.equilibrate(model, data)
+        found["steady"] = np.unique(data.act.round(12)).tolist()
+        mujoco.mj_forward(model, data)
+        found["force"] = -data.actuator_force[0] / joint.muscles[flexor].max_isometric_force
+    found["read"] = mjhill.read_muscle(model, flexor) == joint.muscles[flexor]
+    return found
 
 
-def start():
-    data = mujoco.MjData(model)
-    data.qpos[0] = joint.home_angle
-    mjhill.equilibrate(model, data)
-    return data
-
-
-found = {"na": model.na, "findings": len(mjhill.check_model(model))}
-for integrator in ("implicitfast", "RK4"):
-    model.opt.integrator = getattr(mujoco.mjtIntegrator, "mjINT_" + integrator.upper())
-    runs = {}
-    for backend in ("compiled", "python"):
-        with mjhill.installed(backend):
-            run = mjhill.record(model, start(), duration=0.3, excitation={flexor: 0.2})
-            runs[backend] = run["elbow.angle"]
-    exact = mjhill.reference.simulate(joint, {flexor: 0.2}, duration=0.3)
-    found[integrator] = {
-        "apart": float(np.abs(runs["compiled"] - runs["python"]).max()),
-        "off": float(np.abs(runs["compiled"] - exact["elbow.angle"]).max()),
-        "moved": float(np.ptp(exact["elbow.angle"])),
-        "gap": mjhill.energy(run).gap,
-    }
-with mjhill.installed():
-    data = mujoco.MjData(model)
-    data.ctrl[:] = 0.3, 0.1
-    mjhill.equilibrate(model, data)
-    found["steady"] = np.unique(data.act.round(12)).tolist()
-    mujoco.mj_forward(model, data)
-    found["force"] = -data.actuator_force[0] / joint.muscles[flexor].max_isometric_force
-found["read"] = mjhill.read_muscle(model, flexor) == joint.muscles[flexor]
-found["cached"] = len(list(cache_folder().glob("*.code")))
-print(json.dumps(found))
+found = {name: at_work(name) for name in sys.argv[1:]}
+print(json.dumps({**found, "cached": len(list(cache_folder().glob("*.code")))}))
 """

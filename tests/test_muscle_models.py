@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -334,37 +335,40 @@ def test_a_new_model_is_a_file_and_a_line(tmp_path):
     shutil.copytree(ROOT / "models", tmp_path / "models")
     folder = tmp_path / "mjhill" / "muscles"
     (folder / "cascade.py").write_text(CASCADE)
+    page = (ROOT / "docs" / "new_muscle_model.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```python file\n(.*?)```", page, re.DOTALL)
+    (folder / "direct.py").write_text(example)
     registry, line = folder / "__init__.py", "    hill_rigid.MODEL,\n"
-    text = registry.read_text().replace(
-        "import hill, hill_rigid", "import cascade, hill, hill_rigid"
-    )
-    registry.write_text(text.replace(line, line + "    cascade.MODEL,\n"))
+    text = registry.read_text().replace("import hill,", "import cascade, direct, hill,")
+    registry.write_text(text.replace(line, f"{line}    cascade.MODEL,\n    direct.MODEL,\n"))
     where = {"PYTHONPATH": str(tmp_path), "MJHILL_CACHE_DIR": str(tmp_path / "cache")}
 
-    def run():
+    def run(*names):
         done = subprocess.run(
-            [sys.executable, "-W", "error", "-c", RUN],
+            [sys.executable, "-W", "error", "-c", RUN, *names],
             cwd=tmp_path, capture_output=True, text=True, env=os.environ | where, check=False,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)
 
-    found = run()
-    assert found["na"] == 10
-    assert found["findings"] == 0
-    assert found["steady"] == [0.1, 0.3]
-    assert found["force"] == pytest.approx(0.3)
-    assert found["read"]
-    for integrator, most in (("implicitfast", 0.02), ("RK4", 1e-5)):
-        one = found[integrator]
-        assert one["moved"] > 0.1
-        assert one["apart"] < 1e-12
-        assert one["off"] < most * one["moved"]
-        assert one["gap"] < 0.01
+    found = run("cascade", "direct")
+    for name, states in (("cascade", 10), ("direct", 4)):
+        one = found[name]
+        assert one["na"] == states
+        assert one["findings"] == 0
+        assert one["steady"] == [0.1, 0.3]
+        assert one["force"] == pytest.approx(0.3)
+        assert one["read"]
+        for integrator, most in (("implicitfast", 0.02), ("RK4", 1e-5)):
+            runs = one[integrator]
+            assert runs["moved"] > 0.1
+            assert runs["apart"] < 1e-12
+            assert runs["off"] < most * runs["moved"]
+            assert runs["gap"] < 0.01
     # an equation that changes never meets the code of before
     (folder / "cascade.py").write_text(CASCADE.replace("GAIN = 1.0", "GAIN = 0.5"))
-    changed = run()
-    assert changed["force"] == pytest.approx(0.15)
+    changed = run("cascade")
+    assert changed["cascade"]["force"] == pytest.approx(0.15)
     assert (found["cached"], changed["cached"]) == (1, 2)
 
 

@@ -67,7 +67,7 @@ def test_a_recording_becomes_stacked_axes_with_units(tmp_path, figures) -> None:
     assert labels(figures[0]) == [
         "angle [°]",
         "joint velocity [°/s]",
-        "drive [-]",
+        "u, n, a [-]",
         "muscle torque [N·m]",
         "CE shortening [°/s]",
         "SE stretch [°]",
@@ -100,7 +100,7 @@ def test_a_muscle_keeps_its_colour_when_it_is_drawn_alone(tmp_path, figures) -> 
 
 def test_a_native_muscle_is_drawn_without_what_it_lacks(tmp_path, figures) -> None:
     plot_recording(recording(native=True), tmp_path / "run.png")
-    assert labels(figures[0])[2:] == ["drive [-]", "muscle torque [N·m]"]
+    assert labels(figures[0])[2:] == ["u, n, a [-]", "muscle torque [N·m]"]
 
 
 def test_an_overlay_gives_each_recording_a_style(tmp_path, figures) -> None:

@@ -19,6 +19,9 @@ from mjhill.identification.report import brief
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = {
+    path.stem: path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs").glob("*.md"))
+}
 MODELS = [
     path.read_text(encoding="utf-8") for path in sorted((ROOT / "models").glob("*/README.md"))
 ]
@@ -30,15 +33,22 @@ def blocks(text, language):
 
 COMMANDS = [
     line.partition("#")[0].split()[1:]
-    for block in blocks(README, "sh")
+    for page in (README, *PAGES.values())
+    for block in blocks(page, "sh")
     for line in block.splitlines()
     if line.startswith("mjhill ")
 ]
 
 
-@pytest.mark.parametrize(
-    "snippet", [block for text in (README, *MODELS) for block in blocks(text, "python")]
-)
+SNIPPETS = [
+    block
+    for text in (README, *PAGES.values(), *MODELS)
+    for block in blocks(text, "python")
+    if "mujoco.viewer" not in block  # needs a screen; test_viewer has one
+]
+
+
+@pytest.mark.parametrize("snippet", SNIPPETS)
 def test_every_python_snippet_runs(snippet):
     users = {k: v for k, v in os.environ.items() if k != "MJHILL_AUTOLOAD"}
     run = subprocess.run(
@@ -77,13 +87,25 @@ def outputs(command):
     return [value for option, value in pairwise(command) if option == "--output"]
 
 
+def test_the_readme_is_short():
+    assert len(README.splitlines()) <= 180
+
+
+def test_links_lead_somewhere():
+    for folder, page in ((ROOT, README), *((ROOT / "docs", page) for page in PAGES.values())):
+        for target in re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)|src=\"([^\"]+)\"", page):
+            (path,) = filter(None, target)
+            if "://" not in path:
+                assert (folder / path).exists(), path
+
+
 def test_there_are_snippets_of_each_kind():
     assert len(blocks(README, "python")) >= 3
     assert len(COMMANDS) >= 5
 
 
 def test_the_mjcf_snippet_is_a_model_in_order():
-    (xml,) = blocks(README, "xml")
+    (xml,) = blocks(PAGES["muscle"], "xml")
     model = mujoco.MjModel.from_xml_string(xml)
     mjhill.check_model(model)
     joint = mjhill.JOINTS["elbow"]
@@ -92,7 +114,9 @@ def test_the_mjcf_snippet_is_a_model_in_order():
 
 
 def test_the_parameter_table_is_the_slot_table():
-    rows = re.findall(r"^\| `(\w+)\[(\d+)\]`(?:, `\[(\d+)\]`)? \| (.*?) \|", README, re.MULTILINE)
+    rows = re.findall(
+        r"^\| `(\w+)\[(\d+)\]`(?:, `\[(\d+)\]`)? \| (.*?) \|", PAGES["muscle"], re.MULTILINE
+    )
     found = {}
     for array, first, second, names in rows:
         slots = [int(first)] + ([int(second)] if second else [])
@@ -102,7 +126,8 @@ def test_the_parameter_table_is_the_slot_table():
 
 
 def table_under(marker):
-    (table,) = re.findall(rf"<!-- {marker}.*?-->\n(.*?)<!-- end -->", README, re.DOTALL)
+    page = PAGES["parameters"]
+    (table,) = re.findall(rf"<!-- {marker}.*?-->\n(.*?)<!-- end -->", page, re.DOTALL)
     return [line.strip("|").split("|") for line in table.splitlines()]
 
 
@@ -137,7 +162,7 @@ def table_of(page, name):
 
 
 def test_the_accuracy_table_is_what_the_benchmark_measures():
-    written, measured = table_of(README, "accuracy"), accuracy.brief()
+    written, measured = table_of(PAGES["numerics"], "accuracy"), accuracy.brief()
     assert [row[0] for row in written] == [row[0] for row in measured]
     for row, (_, cells) in zip(written, measured, strict=True):
         for cell, errors in zip(row[1:], cells, strict=True):

@@ -51,17 +51,24 @@ def _inputs_options(function: Any) -> Any:
         "-t",
         multiple=True,
         metavar="JOINT=N·m[@START[:END]]",
-        help="Torque on a joint from outside, on a slide a force in N; several add up.",
+        help="External torque on a joint, on a slide a force in N; several add up.",
     )
     excite = click.option(
         "--excite",
         "-e",
         multiple=True,
-        metavar="MUSCLE=LEVEL[@START[:END]]",
-        help="Neural input of a muscle, 0 to 1; several add up. Without any, and without "
+        metavar="MUSCLE=EXCITATION[@START[:END]]",
+        help="Excitation of a muscle, 0 to 1; several add up. Without any, and without "
         "--torque: the movement of demo.",
     )
     return excite(torque(function))
+
+
+muscle_option = click.option(
+    "--muscle",
+    metavar="NAME",
+    help="Muscle model in the place of hill, such as hill-rigid.",
+)
 
 
 @main.command()
@@ -101,17 +108,18 @@ def list_(as_json: bool) -> None:
 @main.command()
 @click.argument("model")
 @click.option("--mjcf", is_flag=True, help="Print the MJCF of the muscles instead.")
+@muscle_option
 @json_option
-def info(model: str, mjcf: bool, as_json: bool) -> None:
+def info(model: str, mjcf: bool, muscle: str | None, as_json: bool) -> None:
     """Show the parameters of MODEL, a joint's name or a path, with units and sources."""
     from mjhill.cli.describe import gravity, rows
     from mjhill.engine.mjcf import snippet
     from mjhill.simulate.load import load
 
     if mjcf:
-        click.echo(snippet(load(model)))
+        click.echo(snippet(load(model, muscle)))
         return
-    print_table(rows(model), as_json, title=model)
+    print_table(rows(model, muscle), as_json, title=model)
     if not as_json:
         print_line(f"Gravity: {gravity(model)}")
 
@@ -119,6 +127,7 @@ def info(model: str, mjcf: bool, as_json: bool) -> None:
 @main.command()
 @click.argument("model")
 @_inputs_options
+@muscle_option
 @click.option("--duration", "-d", default=4.0, show_default=True, help="Length [s].")
 @click.option(
     "--output",
@@ -132,6 +141,7 @@ def run(
     model: str,
     excite: tuple[str, ...],
     torque: tuple[str, ...],
+    muscle: str | None,
     duration: float,
     output: Path | None,
     plot: Path | None,
@@ -141,12 +151,13 @@ def run(
     files = {"recording": output or _OUT / f"run-{Path(model).stem}.csv"}
     if plot:
         files["plot"] = plot
-    _film(model, _parse(excite), _parse(torque), duration, files, as_json)
+    _film(model, _parse(excite), _parse(torque), duration, files, as_json, muscle)
 
 
 @main.command()
 @click.argument("model")
 @_inputs_options
+@muscle_option
 @click.option("--duration", "-d", default=4.0, show_default=True, help="Length [s].")
 @click.option(
     "--output",
@@ -163,6 +174,7 @@ def video(
     model: str,
     excite: tuple[str, ...],
     torque: tuple[str, ...],
+    muscle: str | None,
     duration: float,
     output: Path | None,
     as_json: bool,
@@ -171,7 +183,7 @@ def video(
     """Film MODEL, a joint's name or a path, without a screen."""
     _check_frames(duration, options["fps"], options["speed"])
     files = {"video": output or _OUT / f"video-{Path(model).stem}.mp4"}
-    _film(model, _parse(excite), _parse(torque), duration, files, as_json, **options)
+    _film(model, _parse(excite), _parse(torque), duration, files, as_json, muscle, **options)
 
 
 @main.command()
@@ -180,8 +192,16 @@ def video(
               show_default=True, help="Folder, with a folder for each model in it.")  # fmt: skip
 @click.option("--video/--no-video", default=True, show_default=True)
 @click.option("--cost/--no-cost", default=True, show_default=True, help="Time the steps too.")
+@muscle_option
 @json_option
-def compare(models: tuple[str, ...], output: Path, video: bool, cost: bool, as_json: bool) -> None:
+def compare(
+    models: tuple[str, ...],
+    output: Path,
+    video: bool,
+    cost: bool,
+    muscle: str | None,
+    as_json: bool,
+) -> None:
     """Compare each MODEL's muscles with MuJoCo's own on the same plant and inputs.
 
     A MODEL is a joint's name or a path; without any it is the elbow. With --json a list, one item
@@ -192,10 +212,10 @@ def compare(models: tuple[str, ...], output: Path, video: bool, cost: bool, as_j
     models = tuple(dict.fromkeys(models)) or ("elbow",)
     folders = _folders(models, output)
     for model in models:
-        comparison.check(model)  # before the first one takes its time
+        comparison.check(model, muscle)  # before the first one takes its time
     results = []
     for model in models:
-        result, paths = _compare(model, folders[model], video, cost)
+        result, paths = _compare(model, folders[model], video, cost, muscle)
         if as_json:
             results.append({**result.as_dict(), "files": list(map(str, paths))})
         else:
@@ -270,17 +290,21 @@ def _folders(models: tuple[str, ...], output: Path) -> dict[str, Path]:
     return folders
 
 
-def _compare(model: str, folder: Path, video: bool, cost: bool) -> tuple[Any, list[Path]]:
+def _compare(
+    model: str, folder: Path, video: bool, cost: bool, muscle: str | None
+) -> tuple[Any, list[Path]]:
     """Compare one model and write its folder."""
     from dataclasses import replace
 
     from mjhill import comparison
 
     with progress_bar(f"comparing {model}") as progress:
-        result = comparison.compare(model, progress=progress)
+        result = comparison.compare(model, muscle=muscle, progress=progress)
     if cost:
         with progress_bar(f"timing steps of {model}") as progress:
-            result = replace(result, cost=comparison.step_cost(model, progress=progress))
+            result = replace(
+                result, cost=comparison.step_cost(model, muscle=muscle, progress=progress)
+            )
     with progress_bar(f"writing {model}") as progress:
         return result, comparison.write(result, folder, video=video, progress=progress)
 
@@ -304,6 +328,7 @@ def _film(
     duration: float,
     files: dict[str, Path],
     as_json: bool,
+    muscle: str | None = None,
     **video: Any,
 ) -> None:
     """Run a model from its home pose, write what ``files`` names and print what came out."""
@@ -315,7 +340,7 @@ def _film(
         if path.suffix not in _SUFFIXES[kind]:
             wanted = " or ".join(_SUFFIXES[kind])
             raise ValueError(f"{kind} {str(path)!r} must end in {wanted}")
-    loaded = load(model)
+    loaded = load(model, muscle)
     for path in files.values():
         if path.parent == _OUT:
             _OUT.mkdir(exist_ok=True)

@@ -21,7 +21,7 @@ from mjhill.quantity import quantities
 from mjhill.simulate.load import load
 
 
-def rows(model: str | Path) -> list[dict[str, Any]]:
+def rows(model: str | Path, muscle: str | None = None) -> list[dict[str, Any]]:
     """Every parameter of a joint or of the muscles in a file.
 
     Each row has ``of``, ``parameter``, ``symbol``, ``value``, ``unit``, ``meaning`` and
@@ -31,13 +31,13 @@ def rows(model: str | Path) -> list[dict[str, Any]]:
         ValueError: As ``load``.
     """
     if str(model) in JOINTS:
-        joint = JOINTS[str(model)]
+        joint = JOINTS[str(model)] if muscle is None else JOINTS[str(model)].with_muscles(muscle)
         parts: list[tuple[str, Any, bool]] = [(joint.name, joint, True)]
         parts.append((joint.name, joint.passive, True))
         parts += [(name, muscle, True) for name, muscle in joint.muscles.items()]
         return [row for part in parts for row in _part_rows(*part)] + list(_angle_rows(joint))
     else:
-        loaded = load(model)
+        loaded = load(model, muscle)
         parts = [
             (name, read_passive(loaded, name), hinge) for name, hinge in elastic_joints(loaded)
         ]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mjhill.comparison.native import compiled, converted, native_spec, read_spec
 from mjhill.engine.install import Backend, installed
 from mjhill.engine.layout import muscle_names
-from mjhill.muscles.hill import Hill
+from mjhill.muscles.parts import Contractile
 from mjhill.simulate.run import check_warnings
 
 _INTEGRATORS = tuple(mujoco.mjtIntegrator.__members__.values())
@@ -40,6 +40,7 @@ class StepCost:
         mjhill_per_muscle: What one of ours adds [µs].
         ratio: A whole step with our muscles over one with MuJoCo's [-].
         muscles: Muscles in the model.
+        muscle: Name of the muscle model that takes the place of ``hill``.
         rounds: Timed blocks of each model.
         steps: Steps in a block.
         backend: What ran our muscles.
@@ -69,6 +70,7 @@ class StepCost:
 def step_cost(
     model: str | Path = "elbow",
     *,
+    muscle: str | None = None,
     rounds: int = 1000,
     steps: int = 200,
     backend: Backend = "compiled",
@@ -83,6 +85,7 @@ def step_cost(
 
     Args:
         model: A joint's name, such as ``"elbow"``, or a path to an MJCF file.
+        muscle: Name of the muscle model that takes the place of ``hill``.
         rounds: Timed blocks of each model.
         steps: Steps in a block.
         backend: What runs our muscles.
@@ -97,7 +100,7 @@ def step_cost(
     for what, value in (("rounds", rounds), ("steps", steps)):
         if value < 1:
             raise ValueError(f"{what} must be at least 1, got {value}")
-    spec = read_spec(model)
+    spec = read_spec(model, muscle)
     if integrator is not None:
         spec.option.integrator = _integrator(integrator)
     models = [compiled(kind) for kind in (bare_spec(spec), native_spec(spec), spec)]
@@ -153,7 +156,7 @@ def bare_spec(spec: mujoco.MjSpec) -> mujoco.MjSpec:
         ValueError: The model has no muscle of ours.
     """
 
-    def convert(actuator: mujoco.MjsActuator, muscle: Hill, length0: float) -> None:
+    def convert(actuator: mujoco.MjsActuator, muscle: Contractile, length0: float) -> None:
         del length0
         gear = -float(actuator.gear[0]) * muscle.max_isometric_force
         actuator.set_to_motor()

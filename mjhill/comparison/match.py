@@ -16,9 +16,11 @@ from mjhill.comparison.native import (
     native_spec,
     read_spec,
 )
+from mjhill.elements import hill_relation
 from mjhill.engine.layout import address, muscle_names, read_muscle
-from mjhill.muscles import hill_of
+from mjhill.muscles import contractile_of
 from mjhill.muscles.hill import Hill
+from mjhill.muscles.parts import Contractile
 
 _PART = 0.5  # control at which the size dependence of MuJoCo's activation is shown
 
@@ -44,25 +46,26 @@ class Match:
     how: str
 
 
-def matching(model: str | Path) -> tuple[Match, ...]:
+def matching(model: str | Path, muscle: str | None = None) -> tuple[Match, ...]:
     """What was matched and what could not be, for each muscle of a model.
 
     The values of MuJoCo's muscle are read back from its compiled model.
 
     Args:
         model: A joint's name, such as ``"elbow"``, or a path to an MJCF file.
+        muscle: Name of the muscle model that takes the place of ``hill``.
 
     Raises:
         ValueError: As ``native_model``.
     """
-    spec = read_spec(model)
+    spec = read_spec(model, muscle)
     ours, native = compiled(spec), compiled(native_spec(spec))
     rows: list[Match] = []
     for name in muscle_names(ours):
         units = _units(ours, name)
-        muscle, other = hill_of(read_muscle(ours, name)), read_native(native, name)
-        rows += _matched(name, muscle, other, _optimum(native, name), units)
-        rows += _unmatched(name, muscle, other, units)
+        one, other = contractile_of(read_muscle(ours, name)), read_native(native, name)
+        rows += _matched(name, one, other, _optimum(native, name), units)
+        rows += _unmatched(name, one, other, units)
     return tuple(rows)
 
 
@@ -99,7 +102,7 @@ def _units(model: mujoco.MjModel, name: str) -> tuple[str, str]:
 
 
 def _matched(
-    name: str, ours: Hill, native: NativeMuscle, optimum: float, units: tuple[str, str]
+    name: str, ours: Contractile, native: NativeMuscle, optimum: float, units: tuple[str, str]
 ) -> list[Match]:
     force, length = units
     unit, half = native.unit_length, math.sqrt(math.log(2))
@@ -140,17 +143,19 @@ def _matched(
     return [Match(name, *row) for row in rows]
 
 
-def _unmatched(name: str, ours: Hill, native: NativeMuscle, units: tuple[str, str]) -> list[Match]:
-    hill = ours.hill_shape
+def _unmatched(
+    name: str, ours: Contractile, native: NativeMuscle, units: tuple[str, str]
+) -> list[Match]:
+    stretch = ours.series_stretch if isinstance(ours, Hill) else 0.0
     rise = native_delay(_PART, rising=True) * native.activation_tau
     no = "not matched: "
     rows = (
         (
-            "force at half of that velocity", "F_max", 0.5 * hill / (hill + 0.5), 0.25,
+            "force at half of that velocity", "F_max", hill_relation(0.5, ours.hill_shape), 0.25,
             no + "Hill's A; MuJoCo's curve is one parabola (1 - v)^2",
         ),
         (
-            "series element, stretch at F_max", units[1], ours.series_stretch, 0.0,
+            "series element, stretch at F_max", units[1], stretch, 0.0,
             no + "MuJoCo's tendon is rigid",
         ),
         (

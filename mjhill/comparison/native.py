@@ -1,4 +1,4 @@
-"""MuJoCo's own ``<muscle>`` in the place of ours, matched as far as its parameters allow.
+"""MuJoCo's own ``<muscle>`` in the place of mjhill's, matched as far as its parameters allow.
 
 MuJoCo's muscle is a force on a rigid tendon with one state. Its force at length L and velocity
 V is ``F_max a FL(L) FV(V)`` with FL a bump of four parabolas and FV a parabola
@@ -18,10 +18,11 @@ import mujoco
 import numpy as np
 
 from mjhill.engine.install import without_python_callbacks
-from mjhill.engine.layout import actuator_names, addresses, is_muscle, read_muscle
+from mjhill.engine.layout import actuator_names, addresses, model_of_actuator, read_muscle
+from mjhill.engine.spec import with_muscles
 from mjhill.joints.reader import JOINTS
-from mjhill.muscles import hill_of
-from mjhill.muscles.hill import Hill
+from mjhill.muscles import contractile_of
+from mjhill.muscles.parts import Contractile
 from mjhill.simulate.load import load, model_path
 
 _LMIN = 0.5  # MuJoCo's default; it fixes the unit of length, not the curve
@@ -54,12 +55,12 @@ class NativeMuscle:
     deactivation_tau: float
 
 
-def native_muscle(muscle: Hill) -> NativeMuscle:
-    """The parameters of MuJoCo's muscle that come nearest to ours.
+def native_muscle(muscle: Contractile) -> NativeMuscle:
+    """The parameters of MuJoCo's muscle that come nearest to a muscle of mjhill.
 
     Its bump is half as high midway between the optimum and either end, so the ends lie twice as
     far from the optimum as the Gaussian's half height. Its time constants are those with which a
-    full step of the control takes activation 63 % of the way in the same time as ours.
+    full step of the control takes activation 63 % of the way in the same time.
     """
     unit = 2 * _HALF_HEIGHT * muscle.width_short / (1 - _LMIN)
     rise, fall = (muscle_delay(muscle, rising=rising) for rising in (True, False))
@@ -75,8 +76,8 @@ def native_muscle(muscle: Hill) -> NativeMuscle:
     )
 
 
-def muscle_delay(muscle: Hill, *, rising: bool) -> float:
-    """Time [s] our activation takes for 1 - 1/e of the way after a step of the control.
+def muscle_delay(muscle: Contractile, *, rising: bool) -> float:
+    """Time [s] that activation takes for 1 - 1/e of the way after a step of the control.
 
     The lags in series are linear both ways, so the size of the step does not matter.
     """
@@ -113,29 +114,29 @@ def native_delay(level: float, *, rising: bool) -> float:
 
 
 def native_model(model: str | Path) -> mujoco.MjModel:
-    """A model in which MuJoCo's muscles stand for ours.
+    """A model with MuJoCo's muscles in the place of mjhill's.
 
     Args:
         model: A joint's name, such as ``"elbow"``, or a path to an MJCF file.
 
     Raises:
-        ValueError: As ``mjhill.load``; or the file is not MJCF, or has no muscle of ours.
+        ValueError: As ``mjhill.load``; or the file is not MJCF, or has no mjhill muscle.
     """
     return compiled(native_spec(read_spec(model)))
 
 
 def native_spec(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """A copy of a model in which MuJoCo's muscles stand for ours; all else is kept.
+    """A copy of a model with MuJoCo's muscles in the place of mjhill's; all else is kept.
 
     Name, joint or tendon, gear and control range stay as they are, as does the joint's passive
-    elasticity: its exponential part comes from our passive callback, as before. Keyframes keep
+    elasticity: its exponential part comes from mjhill's passive callback, as before. Keyframes keep
     the activation.
 
     Raises:
-        ValueError: The model has no muscle of ours.
+        ValueError: The model has no mjhill muscle.
     """
 
-    def convert(actuator: mujoco.MjsActuator, muscle: Hill, length0: float) -> None:
+    def convert(actuator: mujoco.MjsActuator, muscle: Contractile, length0: float) -> None:
         native = native_muscle(muscle)
         optimum = length0 + muscle.optimal_length
         ends = [(end - 1) * native.unit_length for end in (native.lmin, native.lmax)]
@@ -158,7 +159,7 @@ def native_spec(spec: mujoco.MjSpec) -> mujoco.MjSpec:
 
 def converted(
     spec: mujoco.MjSpec,
-    convert: Callable[[mujoco.MjsActuator, Hill, float], None],
+    convert: Callable[[mujoco.MjsActuator, Contractile, float], None],
     *,
     states: int,
 ) -> mujoco.MjSpec:
@@ -171,11 +172,11 @@ def converted(
         states: Activations of the new actuator: 1, or 0 for none.
 
     Raises:
-        ValueError: The model has no muscle of ours.
+        ValueError: The model has no mjhill muscle.
     """
     model, result = compiled(spec), spec.copy()
-    muscles: Mapping[str, tuple[Hill, float]] = {
-        name: (hill_of(read_muscle(model, name)), float(model.actuator_length0[at.out]))
+    muscles: Mapping[str, tuple[Contractile, float]] = {
+        name: (contractile_of(read_muscle(model, name)), float(model.actuator_length0[at.out]))
         for name, at in addresses(model)
     }
     if not muscles:
@@ -196,17 +197,22 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
         return spec.copy().compile()
 
 
-def read_spec(model: str | Path) -> mujoco.MjSpec:
+def read_spec(model: str | Path, muscle: str | None = None) -> mujoco.MjSpec:
     """The spec of a joint's model or of an MJCF file, checked as ``mjhill.load`` checks it.
+
+    Args:
+        model: A joint's name, or a path.
+        muscle: Name of the muscle model that takes the place of ``hill``; see ``mjhill.load``.
 
     Raises:
         ValueError: As ``mjhill.load``; or the file is not MJCF.
     """
-    load(model)
+    load(model, muscle)
     path = model_path(str(model)) if str(model) in JOINTS else Path(model)
     if path.suffix == ".mjb":
         raise ValueError(f"{path}: a binary model cannot be changed; give its MJCF file (.xml)")
-    return mujoco.MjSpec.from_file(str(path))
+    spec = mujoco.MjSpec.from_file(str(path))
+    return spec if muscle is None else with_muscles(spec, muscle)
 
 
 def _kept_states(model: mujoco.MjModel, states: int) -> list[int]:
@@ -214,8 +220,9 @@ def _kept_states(model: mujoco.MjModel, states: int) -> list[int]:
     kept: list[int] = []
     for i in range(model.nactuator):
         first = int(model.actuator_actadr[i])
-        if is_muscle(model, i):
-            kept += [first + 1][:states]
+        kind = model_of_actuator(model, i)
+        if kind is not None:
+            kept += [first + kind.state_names.index(kind.activation)][:states]
         else:
             kept += range(first, first + int(model.actuator_actnum[i]))
     return kept

@@ -292,12 +292,13 @@ class Comparison:
 def compare(
     model: str | Path = "elbow",
     *,
+    muscle: str | None = None,
     level: float = 0.5,
     levels: tuple[float, float] = (0.1, 0.5),
     hit: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Comparison:
-    """Run a model with our muscles and with MuJoCo's through the same tasks and measure both.
+    """Run a model with mjhill's muscles and with MuJoCo's through the same tasks; measure both.
 
     The tasks are ``step`` and ``pulses`` from the home pose, and ``impulse <level>``: a load for
     20 ms on the joint at rest, with both muscles co-contracted. Every hit finds the joint in one
@@ -306,8 +307,9 @@ def compare(
 
     Args:
         model: A joint's name, such as ``"elbow"``, or a path to an MJCF file with one joint.
-        level: Input of the step, in (0, 1].
-        levels: Two inputs of co-contraction, in (0, 1].
+        muscle: Name of the muscle model that takes the place of ``hill``, such as ``hill-rigid``.
+        level: Excitation of the step, in (0, 1].
+        levels: Two excitations of co-contraction, in (0, 1].
         hit: Torque [N·m] or force [N] on the joint; without it, 15 % of what the agonist's
             maximum isometric force puts there.
         progress: Called after each task with the share done, 0 to 1.
@@ -318,7 +320,7 @@ def compare(
         RuntimeError: MuJoCo warned of a bad state, or the joint does not come to rest.
     """
     _check_inputs(level, levels, hit)
-    spec = read_spec(model)
+    spec = read_spec(model, muscle)
     models = {"mjhill": compiled(spec), "native": compiled(native_spec(spec))}
     pair = find_pair(models["mjhill"])
     load = _HIT_SHARE * pair.max_load if hit is None else hit
@@ -341,19 +343,19 @@ def compare(
         str(model),
         pair,
         _tasks(pair, recordings[_impulse(levels[0])]["mjhill"], level, levels, load),
-        matching(model),
+        matching(model, muscle),
         tuple(_rows(pair, recordings, inertia(models["mjhill"], posture))),
         recordings,
     )
 
 
-def check(model: str | Path) -> None:
-    """Look whether a model can be compared, which takes no time.
+def check(model: str | Path, muscle: str | None = None) -> None:
+    """Check at once whether a model can be compared.
 
     Raises:
         ValueError: As ``compare``.
     """
-    spec = read_spec(model)
+    spec = read_spec(model, muscle)
     compiled(native_spec(spec))
     find_pair(compiled(spec))
 

@@ -180,7 +180,7 @@ def _muscle_axes(recording: Recording, muscles: Sequence[str]) -> Iterator[_Axis
         lines += found
         key += [(suffix, style, "0.3")] if found else []
     if lines:
-        yield _Axis("drive [-]", tuple(lines), tuple(key))
+        yield _Axis("u, n, a [-]", tuple(lines), tuple(key))
     rows = (("force", "force"), ("velocity", "CE shortening"), ("stretch", "SE stretch"))
     yield from _series_axes(recording, muscles, rows, "-")
 

@@ -150,38 +150,33 @@ def add_passive(spec: mujoco.MjSpec, *, joint: str, passive: Passive) -> None:
         spec.nuser_jnt = max(spec.nuser_jnt, NUSER_JNT)
 
 
-def with_muscles(spec: mujoco.MjSpec, name: str) -> mujoco.MjModel:
-    """Compile a model with all its muscles as those of another muscle model.
+def with_muscles(spec: mujoco.MjSpec, name: str) -> mujoco.MjSpec:
+    """A copy of a model with all its muscles as those of another muscle model.
 
     Poses of its keys stay; there the muscles are steady.
 
     Raises:
         ValueError: There is no muscle model of this name, or a muscle cannot be made one of it.
     """
-    before, changed = spec.compile(), spec.copy()
-    names = actuator_names(before)
-    acts = {
-        names[i]: (int(before.actuator_actadr[i]), int(before.actuator_actnum[i]))
-        for i in range(before.nu)
-    }
-    muscles = read_muscles(before)
-    for k, actuator in enumerate(changed.actuators):
-        if names[k] in muscles:
-            muscle = convert(muscles[names[k]], name)
+    before, changed = spec.copy().compile(), spec.copy()
+    names, muscles = actuator_names(before), read_muscles(before)
+    for actuator, of in zip(changed.actuators, names, strict=True):
+        if of in muscles:
+            muscle = convert(muscles[of], name)
             actuator.actdim = model_of(muscle).state_count(muscle)
             for array, row in parameter_rows(muscle).items():
                 setattr(actuator, array, row)
     for key in changed.keys:
         key.act = []
-    after = changed.compile()
-    for k in range(after.nkey):
-        for i, actuator in enumerate(names):
-            if actuator not in muscles:  # keeps the states that the key has
-                at, count = acts[actuator]
-                first = int(after.actuator_actadr[i])
-                after.key_act[k, first : first + count] = before.key_act[k, at : at + count]
-        data = mujoco.MjData(after)
+    after = changed.copy().compile()
+    data = mujoco.MjData(after)
+    for k, key in enumerate(changed.keys):
         mujoco.mj_resetDataKeyframe(after, data, k)
+        for i, of in enumerate(names):
+            if of not in muscles:  # keeps the states that the key has
+                old, new = int(before.actuator_actadr[i]), int(after.actuator_actadr[i])
+                count = int(before.actuator_actnum[i])
+                data.act[new : new + count] = before.key_act[k, old : old + count]
         equilibrate(after, data)
-        after.key_act[k] = data.act
-    return after
+        key.act = data.act.tolist()
+    return changed

@@ -5,6 +5,7 @@ from __future__ import annotations
 from mjhill.muscles import hill, hill_rigid
 from mjhill.muscles.model import Muscle as Muscle
 from mjhill.muscles.model import MuscleModel as MuscleModel
+from mjhill.muscles.parts import Contractile
 
 MODELS: tuple[MuscleModel, ...] = (
     hill.MODEL,
@@ -72,6 +73,20 @@ def hill_of(muscle: Muscle) -> hill.Hill:
         raise ValueError(
             f"a muscle of the model {model_of(muscle).name!r} was given, and this needs one of the "
             "model 'hill'"
+        )
+    return muscle
+
+
+def contractile_of(muscle: Muscle) -> Contractile:
+    """A muscle, for what needs one with Hill's contractile element.
+
+    Raises:
+        ValueError: It has none.
+    """
+    if not isinstance(muscle, Contractile):
+        raise ValueError(
+            f"a muscle of the model {model_of(muscle).name!r} was given, and this needs one with "
+            "Hill's contractile element"
         )
     return muscle
 

@@ -56,7 +56,7 @@ def load(model: str | Path, muscle: str | None = None) -> mujoco.MjModel:
         raise ValueError(f"{path}: an .mjb cannot change its muscles to {muscle!r}; load the .xml")
     with without_python_callbacks():
         if muscle is not None:
-            loaded = with_muscles(mujoco.MjSpec.from_file(str(path)), muscle)
+            loaded = with_muscles(mujoco.MjSpec.from_file(str(path)), muscle).compile()
         elif binary:
             loaded = mujoco.MjModel.from_binary_path(str(path))
         else:
