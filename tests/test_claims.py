@@ -62,7 +62,7 @@ def test_every_experiment_refuses_a_joint_that_does_not_exist(experiment):
 
 
 def test_an_experiment_that_does_not_exist_is_refused_with_those_that_do():
-    with pytest.raises(AttributeError, match="has no attribute 'sneeze'"):
+    with pytest.raises(AttributeError, match="no experiment 'sneeze'; there are: synergists"):
         experiments.sneeze  # noqa: B018
 
 

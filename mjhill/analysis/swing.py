@@ -7,7 +7,6 @@ from math import pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lsim
 
 from mjhill.analysis.responses import SecondOrder, second_order_fit
 
@@ -107,5 +106,7 @@ def second_order_response(fit: SecondOrder, time: _Values, load: _Values) -> _Va
         load: Load from each sample to the next [N·m], shape (T,).
     """
     system = ([1.0], [fit.inertia, fit.damping, fit.stiffness])
+    from scipy.signal import lsim  # takes more than a second to import
+
     _, fitted, *_ = lsim(system, load, time - time[0], interp=False)
     return np.asarray(fitted)

@@ -5,6 +5,8 @@ They return what was measured, the paper's claims with what decides them, and a 
 ``Result``.
 """
 
+from typing import TYPE_CHECKING, Any
+
 # all here and now: a function and its module have the same name, and the function must win
 from mjhill.experiments.external_impulse import external_impulse as external_impulse
 from mjhill.experiments.external_sinusoid import external_sinusoid as external_sinusoid
@@ -36,3 +38,8 @@ NAMES = (
     "spring_release",
     "external_sinusoid",
 )
+
+if not TYPE_CHECKING:  # a type checker finds unknown names by itself
+
+    def __getattr__(name: str) -> Any:
+        raise AttributeError(f"no experiment {name!r}; there are: {', '.join(NAMES)}")
