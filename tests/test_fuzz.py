@@ -46,12 +46,13 @@ def test_all_integrators_and_timesteps_are_drawn(outcomes):
 def test_muscles_are_drawn_from_the_whole_of_their_ranges():
     drawn = [
         muscle
-        for number in range(150)
+        for number in range(200)
         for kind in KINDS
         for muscle in mjhill.engine.layout.read_muscles(trial.draw(kind, number).model).values()
     ]
+    assert {type(muscle) for muscle in drawn} == {model.parameters for model in mjhill.MODELS}
     for name, quantity in quantities(Hill):
-        values = [getattr(muscle, name) for muscle in drawn]
+        values = [getattr(muscle, name) for muscle in drawn if isinstance(muscle, Hill)]
         assert max(values) == quantity.high, name
         assert min(values) == quantity.low if quantity.low_allowed else min(values) < 1.01, name
     assert {muscle.electrical_stimulation for muscle in drawn} == {False, True}

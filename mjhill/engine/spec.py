@@ -132,6 +132,13 @@ def add_muscle(
     )
 
 
+def set_muscle(actuator: mujoco.MjsActuator, muscle: Muscle) -> None:
+    """Give an actuator that is a muscle new parameters, also of another muscle model."""
+    actuator.actdim = model_of(muscle).state_count(muscle)
+    for array, row in parameter_rows(muscle).items():
+        setattr(actuator, array, row)
+
+
 def add_passive(spec: mujoco.MjSpec, *, joint: str, passive: Passive) -> None:
     """Give a hinge or slide joint exponential passive elasticity about its ``springref``.
 
@@ -162,10 +169,7 @@ def with_muscles(spec: mujoco.MjSpec, name: str) -> mujoco.MjSpec:
     names, muscles = actuator_names(before), read_muscles(before)
     for actuator, of in zip(changed.actuators, names, strict=True):
         if of in muscles:
-            muscle = convert(muscles[of], name)
-            actuator.actdim = model_of(muscle).state_count(muscle)
-            for array, row in parameter_rows(muscle).items():
-                setattr(actuator, array, row)
+            set_muscle(actuator, convert(muscles[of], name))
     for key in changed.keys:
         key.act = []
     after = changed.copy().compile()

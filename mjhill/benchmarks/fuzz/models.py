@@ -19,7 +19,9 @@ from mjhill.benchmarks.fuzz.draws import (
     random_passive,
     sign,
 )
-from mjhill.engine.spec import add_muscle, add_passive
+from mjhill.engine.layout import ARRAYS, parameters_in
+from mjhill.engine.spec import add_muscle, add_passive, set_muscle
+from mjhill.muscles import MODELS, convert, hill
 from mjhill.muscles.hill import Hill
 
 INTEGRATORS = ("EULER", "IMPLICIT", "IMPLICITFAST", "DISCRETE", "RK4")
@@ -85,9 +87,19 @@ def random_model(kind: str, random: Random) -> tuple[mujoco.MjModel, float]:
             objtype=mujoco.mjtObj.mjOBJ_ACTUATOR,
             objname=actuator.name,
         )
+    if chance(random, 0.2):
+        others = [kind.name for kind in MODELS if kind.parameters is not Hill]
+        _exchange(spec, str(random.choice(others)))
     with warnings.catch_warnings():  # of inertias that are hard to invert
         warnings.simplefilter("ignore", UserWarning)
         return spec.compile(), draft.reach
+
+
+def _exchange(spec: mujoco.MjSpec, name: str) -> None:
+    """Make the muscles of a model those of another muscle model."""
+    for actuator in spec.actuators:
+        rows = {array: getattr(actuator, array) for array in ARRAYS}
+        set_muscle(actuator, convert(parameters_in(hill.MODEL, rows), name))
 
 
 def _joint_muscles(draft: Draft) -> None:
