@@ -1,6 +1,7 @@
 """Experiments small enough for tests: real runs, real figures."""
 
 import os
+import signal
 import time
 from dataclasses import dataclass
 from typing import ClassVar
@@ -74,6 +75,11 @@ def crashing(joint="elbow", *, progress=None):
 
 def not_finite(joint="elbow", *, progress=None):
     return Rise(joint, rise(joint, progress=progress).run, float("nan"))
+
+
+def signalled(joint="elbow", *, progress=None):
+    os.kill(os.getpid(), signal.SIGINT)
+    return rise(joint, progress=progress)
 
 
 def endless(joint="elbow", *, progress=None):
