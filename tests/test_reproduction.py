@@ -321,7 +321,7 @@ def test_the_catalogue_has_the_joints_it_names_and_each_experiment_once():
 
 def test_an_experiment_that_needs_its_own_joints_is_left_out_or_refused_on_others():
     assert all(part.entry.id != "synergists" for part in select(CATALOGUE, joints=["knee"]))
-    with pytest.raises(ValueError, match="synergists can be made on elbow only"):
+    with pytest.raises(ValueError, match="synergists runs on elbow only"):
         select(CATALOGUE, ["synergists"], ["knee"])
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from mjhill.draw.bellies import DrawnMuscle
 from mjhill.draw.curves import Plot, common_limits
 from mjhill.draw.panels import Box, Panel
+from mjhill.draw.plot import take_literally
 
 Image = NDArray[np.uint8]
 
@@ -176,7 +177,8 @@ def _draw_axes(
         spine.set_visible(name in ("left", "bottom"))
         spine.set(color=_SOFT, linewidth=points)
     if plot.named:
-        plane.legend(fontsize=letters(12), loc="upper right", frameon=False, ncols=2)
+        key = plane.legend(fontsize=letters(12), loc="upper right", frameon=False, ncols=2)
+        take_literally(key)
     return plane
 
 
