@@ -1,6 +1,7 @@
 """Experiments small enough for tests: real runs, real figures."""
 
 import os
+import signal
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -75,6 +76,11 @@ def crashing(joint="elbow", *, progress=None):
 
 def not_finite(joint="elbow", *, progress=None):
     return Rise(joint, rise(joint, progress=progress).run, float("nan"))
+
+
+def signalled(joint="elbow", *, progress=None):
+    os.kill(os.getpid(), signal.SIGINT)
+    return rise(joint, progress=progress)
 
 
 def endless(joint="elbow", *, progress=None):

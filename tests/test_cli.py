@@ -84,8 +84,8 @@ def test_run_writes_a_recording_and_says_where(tmp_path):
     ("arguments", "message"),
     [
         (("run", "wing"), "unknown model 'wing': no file of that name, and the joints are: elbow"),
-        (("run", "elbow", "-e", "elbow_flexor"), "must read NAME=LEVEL"),
-        (("run", "elbow", "-e", "elbow_flexor=0.5@0.3:0.1"), "must read NAME=LEVEL"),
+        (("run", "elbow", "-e", "elbow_flexor"), "must be NAME=VALUE"),
+        (("run", "elbow", "-e", "elbow_flexor=0.5@0.3:0.1"), "must be NAME=VALUE"),
         (("run", "elbow", "-e", "biceps=0.5"), "unknown actuator 'biceps'"),
         (("run", "elbow", "-d", "-1"), "duration must be positive, got -1.0 s"),
         (("run", "elbow", "-d", "nan"), "duration must be positive, got nan s"),

@@ -24,8 +24,10 @@ def test_the_two_starts_are_far_apart_at_first():
 
 
 def test_a_run_that_warns_is_refused(monkeypatch):
-    inputs = endurance._inputs
+    excitations = endurance._excitations
     late = {7: np.full((SMALL, 2), np.nan)}
-    monkeypatch.setattr(endurance, "_inputs", lambda k, pairs: late.get(k, inputs(k, pairs)))
+    monkeypatch.setattr(
+        endurance, "_excitations", lambda k, pairs: late.get(k, excitations(k, pairs))
+    )
     with pytest.raises(RuntimeError, match=r"MuJoCo warned WARN_BADCTRL within 800 steps"):
         endurance.endure("implicitfast", 1, SMALL)

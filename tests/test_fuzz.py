@@ -5,7 +5,7 @@ from click.testing import CliRunner
 
 import mjhill
 from mjhill.benchmarks import fuzz
-from mjhill.benchmarks.fuzz import trial
+from mjhill.benchmarks.fuzz import outcomes as drawn_outcomes
 from mjhill.benchmarks.fuzz.models import INTEGRATORS, KINDS, TIMESTEPS
 from mjhill.cli import main
 from mjhill.muscles.hill import Hill
@@ -48,7 +48,9 @@ def test_muscles_are_drawn_from_the_whole_of_their_ranges():
         muscle
         for number in range(200)
         for kind in KINDS
-        for muscle in mjhill.engine.layout.read_muscles(trial.draw(kind, number).model).values()
+        for muscle in mjhill.engine.layout.read_muscles(
+            drawn_outcomes.draw(kind, number).model
+        ).values()
     ]
     assert {type(muscle) for muscle in drawn} == {model.parameters for model in mjhill.MODELS}
     for name, quantity in quantities(Hill):

@@ -210,6 +210,17 @@ def test_slides_and_free_joints_are_put_back(tmp_path):
     assert len(frames_of(render(View(model, run), tmp_path / "a.mp4", size=(64, 64), fps=5))) == 5
 
 
+def test_a_dollar_sign_in_the_legend_is_a_dollar_sign(tmp_path):
+    # two joints, so that the plot of angles has a legend; the first name would be a wrong formula
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><worldbody><body><joint name="$\\frac$"/><geom size="0.1"/>
+        <body><joint name="other"/><geom size="0.1"/></body></body></worldbody></mujoco>"""
+    )
+    values = {"$\\frac$.angle": np.zeros(2), "other.angle": np.ones(2)}
+    run = Recording(np.array([0.0, 0.4]), values, dict.fromkeys(values, "rad"))
+    assert render(View(model, run), tmp_path / "a.mp4", size=(640, 360), fps=5).exists()
+
+
 def test_the_users_model_is_left_as_it_was(elbow, tmp_path):
     before = saved(elbow)
     render(View(elbow, recording(0.2)), tmp_path / "elbow.mp4", **SMALL)

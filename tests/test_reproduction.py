@@ -5,7 +5,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 from html.parser import HTMLParser
 from pathlib import Path
@@ -20,7 +19,6 @@ from mjhill.cli import main
 from mjhill.report import CATALOGUE, Entry, fingerprint, report_of, reproduce, select, write_report
 from mjhill.report.page import difference, duration, number, published
 from mjhill.report.part import film_speed
-from mjhill.report.process import uninterrupted
 
 TESTS = Path(__file__).parent
 
@@ -331,7 +329,7 @@ def test_the_catalogue_has_the_joints_it_names_and_each_experiment_once():
 
 def test_an_experiment_that_needs_its_own_joints_is_left_out_or_refused_on_others():
     assert all(part.entry.id != "synergists" for part in select(CATALOGUE, joints=["knee"]))
-    with pytest.raises(ValueError, match="synergists can be made on elbow only"):
+    with pytest.raises(ValueError, match="synergists runs on elbow only"):
         select(CATALOGUE, ["synergists"], ["knee"])
 
 
@@ -412,22 +410,36 @@ def test_differences_are_taken_to_the_nearest_end_of_a_range():
     ]
 
 
-def test_ctrl_c_waits_though_another_thread_takes_the_signal():
-    idle = threading.Event()
-    other = threading.Thread(target=idle.wait)  # it does not block the signal
-    other.start()
-    reached = []
+def test_ctrl_c_reaches_the_parent_alone(tmp_path):
+    outcome = reproduce(tmp_path, catalogue=(entry("signalled"), entry("rise")), jobs=2)
+    assert outcome.exit_code == 0
+    assert outcome.ran == ["signalled-elbow", "rise-elbow"]
 
-    def interrupted():
-        with uninterrupted():
-            os.kill(os.getpid(), signal.SIGINT)
-            time.sleep(0.2)
-            reached.append(True)
 
+def test_ctrl_c_while_a_process_starts_is_quiet_and_leaves_no_process(tmp_path):
+    process = subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED, str(tmp_path)],
+        env={**os.environ, "PYTHONPATH": f"{TESTS}:{TESTS.parent}", "AT_WORK": os.devnull},
+        start_new_session=True,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    until = time.monotonic() + 60
+    # the folder is there before the process is
+    while not list(tmp_path.glob(".endless*")) and time.monotonic() < until:
+        time.sleep(0.001)
     try:
-        with pytest.raises(KeyboardInterrupt):
-            interrupted()
+        os.killpg(process.pid, signal.SIGINT)
+        assert process.communicate(timeout=30) == (None, "")
     finally:
-        idle.set()
-        other.join()
-    assert reached
+        process.kill()
+    assert process.returncode == 130
+    group = [p for p in psutil.process_iter() if p.pid != os.getpid() and in_group(p, process.pid)]
+    assert psutil.wait_procs(group, timeout=10)[1] == []
+
+
+def in_group(process, group):
+    try:
+        return os.getpgid(process.pid) == group
+    except ProcessLookupError:
+        return False

@@ -4,7 +4,7 @@ from click.testing import CliRunner
 
 import mjhill
 from mjhill.benchmarks import sweep
-from mjhill.benchmarks.sweep import trial
+from mjhill.benchmarks.sweep import solutions
 from mjhill.benchmarks.sweep.cases import KINDS, draw
 from mjhill.cli import main
 
@@ -58,7 +58,9 @@ def test_a_hundred_random_systems_are_right_or_have_a_finding(kind):
 def test_the_yardstick_of_spatial_tendons_does_not_depend_on_its_timestep():
     case = draw("spatial", 3)
     with mjhill.installed():
-        coarse, fine = (trial.run(case, "RK4", timestep) for timestep in (trial.FINE, 10e-6))
+        coarse, fine = (
+            solutions.run(case, "RK4", timestep) for timestep in (solutions.FINE, 10e-6)
+        )
     assert np.abs(coarse - fine).max() < 1e-5 * np.ptp(fine)
 
 

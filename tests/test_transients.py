@@ -8,7 +8,7 @@ import pytest
 from conftest import rest
 
 import mjhill
-from mjhill.benchmarks.sweep import cases, trial
+from mjhill.benchmarks.sweep import cases, solutions
 from mjhill.engine.layout import muscle_names
 from mjhill.engine.spec import joint_spec
 from mjhill.simulate import scripted
@@ -175,12 +175,12 @@ def test_random_systems_in_order_have_no_finding(kind):
     for number in range(6):
         case = cases.draw(kind, number)
         for integrator in ("IMPLICITFAST", "RK4"):
-            trial.use(case.model, integrator, 1e-3)
+            solutions.use(case.model, integrator, 1e-3)
             if mjhill.check_model(case.model):
                 continue
             with mjhill.installed():
                 run = mjhill.record(
-                    case.model, trial.at_start(case), duration=cases.DURATION,
+                    case.model, solutions.at_start(case), duration=cases.DURATION,
                     excitation=case.excitation, torque=case.torque,
                 )  # fmt: skip
             assert mjhill.transients(run) == (), case.name

@@ -1,4 +1,4 @@
-"""Benchmarks: what mjhill claims about accuracy and speed, measured on this machine."""
+"""Benchmarks: the accuracy and the speed of mjhill, measured on this machine."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from typing import cast
 
 from mjhill.benchmarks.result import Result
 
-NAMES = ("accuracy", "cost", "threads", "start", "video")
+NAMES = ("accuracy", "balance", "cost", "threads", "start", "video")
 # on two cores without a graphics card
-SECONDS = {"accuracy": 10, "cost": 20, "threads": 10, "start": 30, "video": 230}
-# run by name, one at a time
+SECONDS = {"accuracy": 10, "balance": 10, "cost": 20, "threads": 10, "start": 30, "video": 230}
+# run only by name, one at a time
 LONG = {"sweep": 120, "fuzz": 300, "checks": 150, "endurance": 90}
 
 
 def run(
     names: tuple[str, ...], progress: Callable[[float], None] | None = None
 ) -> dict[str, Result]:
-    """Run benchmarks by name, all without any.
+    """Run benchmarks by name; by default all.
 
     Raises:
         ValueError: There is no such benchmark; the message lists those there are.
@@ -43,7 +43,7 @@ def run_long(
     case: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Result:
-    """Run a benchmark that takes minutes, one of ``LONG``; see its ``measure``.
+    """Run one benchmark of ``LONG``, which take minutes; see its ``measure``.
 
     Raises:
         ValueError: It has no such kind, case or option.
@@ -60,7 +60,7 @@ def run_long(
 
 
 def check_names(names: tuple[str, ...]) -> tuple[str, ...]:
-    """The benchmarks that are asked for, all without any.
+    """The requested benchmarks; by default all but the long ones.
 
     Raises:
         ValueError: There is no such benchmark; the message lists those there are.
@@ -69,7 +69,7 @@ def check_names(names: tuple[str, ...]) -> tuple[str, ...]:
         if name not in NAMES:
             raise ValueError(
                 f"unknown benchmark {name!r}; there are: {', '.join(NAMES)}"
-                f"; by themselves: {', '.join(LONG)}"
+                f"; one at a time: {', '.join(LONG)}"
             )
     return names or NAMES
 
@@ -81,7 +81,7 @@ def length(names: tuple[str, ...]) -> str:
 
 
 def versions() -> str:
-    """What the numbers were measured with."""
+    """Versions of the packages, and the number of cores."""
     packages = ("mjhill", "mujoco", "numba", "numpy", "scipy")
     listed = ", ".join(f"{name} {version(name)}" for name in packages)
     return f"{listed}; Python {platform.python_version()}, {os.cpu_count()} cores"

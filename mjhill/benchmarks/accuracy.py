@@ -26,7 +26,7 @@ INTEGRATORS = ("EULER", "IMPLICIT", "IMPLICITFAST", "DISCRETE", "RK4")
 DURATION = 0.8  # [s]
 ONSET = 0.05  # [s], a multiple of every timestep
 RK4_GOAL = 0.05  # error at 1 ms [°]
-FINE = 10e-6  # [s], for what the native muscle is compared with
+FINE = 10e-6  # [s], of the runs that the native muscle is compared with
 _GRID = 0.5e-3  # [s], divides every timestep
 _SETTLED = 4.0  # [s]
 
@@ -35,12 +35,12 @@ _Angles = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Movement:
-    """What one movement starts from, and what drives it.
+    """The start and the inputs of one movement.
 
     Attributes:
         joint: The joint.
-        tonic: Input of each muscle before, under which the joint has settled.
-        excitation: Input of each muscle.
+        tonic: Excitation of each muscle before the start, at which the joint has settled.
+        excitation: Excitation of each muscle.
         torque: External torque [N·m].
     """
 
@@ -61,7 +61,7 @@ def movements() -> Mapping[str, Movement]:
         for name, muscle in joint.hill_muscles.items()
     }
     both = {flexor: 0.3, extensor: 0.1}
-    held = {name: as_signal(level) for name, level in both.items()}
+    held = {name: as_signal(excitation) for name, excitation in both.items()}
     return {
         "rise": Movement(joint, excitation={flexor: step(0.5, ONSET)}),
         "release": Movement(joint, {flexor: 1.0}, {flexor: as_signal(1.0) + step(-1.0, ONSET)}),
@@ -97,20 +97,20 @@ def measure() -> Result:
         "flexor at 0.5 is stretched by 1.5 F_max for 40 ms; stimulation: electrical, flexor from "
         "0.2 to 0.8; impact: 3 F_max for 10 ms, flexor at 0.3, extensor at 0.1",
         "mjhill against SciPy's LSODA at 1e-9; native against itself at 10 µs",
-        "goal: no more than the native muscle is off itself, where it does the movement; RK4 "
+        "goal: at most the error of the native muscle, in the movements that it can make; RK4 "
         f"at 1 ms {RK4_GOAL:g}°",
-        "at 10 ms the elbow is past the limit of check_model",
+        "10 ms is above the limit of check_model for the elbow",
     )
     return Result("Largest angle error [% of the movement] by timestep", rows, notes)
 
 
 def _goals(name: str, integrator: str) -> dict[float, float]:
-    """The error [%] that is allowed in a movement, by timestep; nothing where nothing is said."""
+    """The allowed error [%] of a movement, by timestep; empty without a goal."""
     if not (native := _muscles(name).get("native", ())):
         return {}
     if integrator == "RK4":
         return {1e-3: 100 * RK4_GOAL / float(np.degrees(np.ptp(_truth(name, "mjhill", ""))))}
-    # under the integrators that it is not measured with, its best one
+    # under integrators that the native muscle is not measured with: its best one
     alike = integrator if integrator in native else "IMPLICITFAST"
     return {timestep: error(name, "native", alike, timestep) for timestep in (1e-3, 5e-3)}
 
@@ -147,7 +147,7 @@ def _at_1_and_5_ms(name: str, muscle: str, integrator: str) -> tuple[float, floa
 
 
 def _muscles(name: str) -> dict[str, tuple[str, ...]]:
-    """Muscles that do a movement, and under which integrators."""
+    """The muscles that can make a movement, and their integrators."""
     native = {"native": ("EULER", "IMPLICITFAST")} if name in ("rise", "release") else {}
     return {"mjhill": INTEGRATORS, **native}
 
@@ -155,9 +155,9 @@ def _muscles(name: str) -> dict[str, tuple[str, ...]]:
 @cache
 def error(name: str, muscle: str, integrator: str, timestep: float) -> float:
     """Largest angle error [% of the movement] of a movement by name."""
-    # the native muscle is its own yardstick, under each integrator
+    # the native muscle is compared with itself, under each integrator
     truth = _truth(name, muscle, integrator if muscle == "native" else "")
-    found = angles(_model(name, muscle), movements()[name], integrator, timestep)
+    found = trajectory(_model(name, muscle), movements()[name], integrator, timestep)
     every = round(timestep / _GRID)
     return float(100 * np.abs(found - truth[::every]).max() / np.ptp(truth))
 
@@ -167,7 +167,7 @@ def _truth(name: str, muscle: str, integrator: str) -> _Angles:
     """Angles every 0.5 ms."""
     movement, model = movements()[name], _model(name, muscle)
     if muscle == "native":
-        fine = angles(model, movement, integrator, FINE)
+        fine = trajectory(model, movement, integrator, FINE)
         return fine[:: round(_GRID / FINE)]
     exact = simulate(
         movement.joint,
@@ -189,7 +189,9 @@ def _model(name: str, muscle: str) -> mujoco.MjModel:
     return native_model(joint.name) if muscle == "native" else joint_spec(joint).compile()
 
 
-def angles(model: mujoco.MjModel, movement: Movement, integrator: str, timestep: float) -> _Angles:
+def trajectory(
+    model: mujoco.MjModel, movement: Movement, integrator: str, timestep: float
+) -> _Angles:
     """Angle [rad] at every step of a movement."""
     angle = _settled(model, movement)
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
@@ -210,7 +212,7 @@ def angles(model: mujoco.MjModel, movement: Movement, integrator: str, timestep:
 
 
 def _settled(model: mujoco.MjModel, movement: Movement) -> float:
-    """Angle [rad] at which the joint stays under the tonic inputs; home without any."""
+    """Angle [rad] at which the joint rests under the tonic excitation; home without any."""
     if not movement.tonic:
         return movement.joint.home_angle
     model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, 1e-3
@@ -221,13 +223,13 @@ def _settled(model: mujoco.MjModel, movement: Movement) -> float:
 
 
 def _at(model: mujoco.MjModel, movement: Movement, angle: float) -> mujoco.MjData:
-    """Data still at an angle, muscles steady at the tonic inputs."""
+    """Data at rest at an angle [rad], with muscles in steady state at the tonic excitation."""
     data = mujoco.MjData(model)
     data.qpos[0] = angle
-    for name, level in movement.tonic.items():
-        data.actuator(name).ctrl = level
+    for name, excitation in movement.tonic.items():
+        data.actuator(name).ctrl = excitation
         if model.na == model.nu:  # a native muscle has one state, its activation
-            data.act[model.actuator_actadr[model.actuator(name).id]] = level
+            data.act[model.actuator_actadr[model.actuator(name).id]] = excitation
     equilibrate(model, data)
     return data
 

@@ -1,9 +1,9 @@
-"""Sound and unsound models past ``check_model``: false alarms, and what it misses.
+"""``check_model`` on sound and unsound models: its false alarms and its misses.
 
-What a model is, its runs say, not the check. Sound: in every run nothing that a muscle cannot do,
-and positions within ``RIGHT`` of those of a timestep eight times shorter. Unsound: at its timestep
-a run does what no muscle can, or is off by more than ``WRONG`` from one that has converged. What is
-neither is left out.
+The runs of a model decide, not the check. Sound: no run does what a muscle cannot do, and
+positions are within ``RIGHT`` of those with a timestep eight times shorter. Unsound: a run does
+what no muscle can do, or differs by more than ``WRONG`` from a converged one. Models that are
+neither are left out.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 
 from mjhill.benchmarks.fuzz import quiet
 from mjhill.benchmarks.fuzz.draws import Random, log_uniform
-from mjhill.benchmarks.fuzz.trial import impossible
+from mjhill.benchmarks.fuzz.outcomes import impossible
 from mjhill.benchmarks.result import Result
 from mjhill.benchmarks.sweep import cases
 from mjhill.benchmarks.sweep.cases import GRID, Case
-from mjhill.benchmarks.sweep.trial import at_start, inputs_of, run, use
+from mjhill.benchmarks.sweep.solutions import at_start, inputs_of, run, use
 from mjhill.engine.checks import check_model
 from mjhill.engine.install import installed
 from mjhill.engine.layout import muscle_names, read_muscle, write_muscle
@@ -46,7 +46,7 @@ MEANINGS = {
 }
 _TIMESTEPS = (0.5e-3, 1e-3, 2e-3, 5e-3, 10e-3)  # [s], each divides the grid of the inputs
 _BASES = ("physiological", "slide", "several", "spatial")
-_BATCH = 8  # models that a process tries at a time
+_BATCH = 8  # models that a process runs at a time
 
 _Values = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -54,14 +54,14 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Verdict:
-    """One model: what its runs say, and what ``check_model`` says.
+    """One model: the verdict of its runs, and the findings of ``check_model``.
 
     Attributes:
         case: Kind and number, as ``step:17``.
-        base: The case of the sweep that it comes from.
+        base: The case of the sweep that it was made from.
         integrator: Its name in MJCF.
         timestep: [s].
-        sound: What the runs say: True, False, or None where they do not say.
+        sound: The verdict of the runs; None if there is none.
         reason: Why it is not sound.
         findings: Those of ``check_model``, the severe first.
         severe: Whether there is a severe one.
@@ -85,7 +85,7 @@ def measure(
     Args:
         count: Sound models, and unsound models.
         case: One model instead, such as ``step:17``.
-        progress: Called now and then with the share done, 0 to 1.
+        progress: Called with the share done, from 0 to 1.
 
     Raises:
         ValueError: A case is unknown.
@@ -110,17 +110,17 @@ def sides(
 
     Args:
         count: Sound models, and unsound models.
-        processes: Processes at a time; by default one a core. With 1, all is done in this one.
-        progress: Called now and then with the share done, 0 to 1.
+        processes: How many processes; by default one for each core. 1 means this process.
+        progress: Called with the share done, from 0 to 1.
     """
     wanted = {"sound": count} | {
         kind: (count + extra) // 3 for extra, kind in enumerate(("step", "stiff", "sign"))
     }
-    with installed():  # so that the machine code is in the cache before processes ask for it
+    with installed():  # compiles once, before the processes start
         if processes == 1:
             return list(_gathered(wanted, lambda jobs: map(_judged, jobs), progress))
     with (
-        tempfile.TemporaryDirectory() as folder,  # MuJoCo writes a log where it runs
+        tempfile.TemporaryDirectory() as folder,  # MuJoCo writes a log to the working folder
         ProcessPoolExecutor(processes, initializer=os.chdir, initargs=(folder,)) as pool,
     ):
         return list(_gathered(wanted, lambda jobs: pool.map(_judged, jobs), progress))
@@ -129,7 +129,7 @@ def sides(
 def _gathered(
     wanted: dict[str, int], judged: Callable[..., Any], progress: Progress | None
 ) -> Iterator[Verdict]:
-    """Models of each kind in the order of their numbers, until as many as wanted are clear."""
+    """Models of each kind in the order of their numbers, until enough have a verdict."""
     total, done = sum(wanted.values()), 0
     for kind, number in wanted.items():
         first, left = 0, number
@@ -163,7 +163,9 @@ def judge(kind: str, number: int) -> Verdict:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         found = sorted(check_model(case.model), key=lambda finding: not finding.severe)
-    sound, reason = (False, "pushes") if kind == "sign" else _said(case, integrator, timestep)
+    sound, reason = (
+        (False, "pushes") if kind == "sign" else _verdict_of_runs(case, integrator, timestep)
+    )
     return Verdict(
         f"{kind}:{number}", case.name, integrator, timestep, sound, reason,
         tuple(map(str, found)), any(finding.severe for finding in found),
@@ -171,7 +173,7 @@ def judge(kind: str, number: int) -> Verdict:
 
 
 def _spoil(kind: str, random: Random, case: Case) -> None:
-    """What makes a model of a kind unsound, or may."""
+    """Change a model so that it is unsound, or may be."""
     model = case.model
     if kind == "step":
         share = log_uniform(random, 1e-3, 1)
@@ -191,10 +193,10 @@ def _spoil(kind: str, random: Random, case: Case) -> None:
         model.actuator_gear[backwards, 0] *= -1.0
 
 
-def _said(case: Case, integrator: str, timestep: float) -> tuple[bool | None, str]:
-    """What the runs of a model say; None where they do not say."""
+def _verdict_of_runs(case: Case, integrator: str, timestep: float) -> tuple[bool | None, str]:
+    """The verdict of a model's runs, None if there is none, and the reason."""
     clear = True
-    for driven in _drives(case):
+    for driven in _inputs(case):
         coarse, strange = _watched(driven, integrator, timestep)
         if strange:
             return False, ", ".join(strange)
@@ -211,8 +213,8 @@ def _said(case: Case, integrator: str, timestep: float) -> tuple[bool | None, st
     return (True, "") if clear else (None, "unclear")
 
 
-def _drives(case: Case) -> Iterator[Case]:
-    """The inputs of a case, and all of its muscles at full force while it is pushed."""
+def _inputs(case: Case) -> Iterator[Case]:
+    """The case itself, and the case with all muscles at full excitation, also while pushed."""
     yield case
     full = pulse(1.0, 0.05, 10.0)
     yield replace(case, excitation={name: full for name in case.excitation}, tonic=_none(case))
@@ -230,7 +232,7 @@ def _none(case: Case) -> dict[str, float]:
 
 
 def _watched(case: Case, integrator: str, timestep: float) -> tuple[_Values, tuple[str, ...]]:
-    """Positions at each step, and what the run shows that no muscle does."""
+    """Positions at each step, and what the run does although no muscle can."""
     model = case.model
     use(model, integrator, timestep)
     data, inputs = at_start(case), inputs_of(case, timestep)
@@ -246,7 +248,7 @@ def _watched(case: Case, integrator: str, timestep: float) -> tuple[_Values, tup
 
 
 def _finer(case: Case, integrator: str, timestep: float, finer: int) -> _Values:
-    """Positions at multiples of the timestep, of a run with one that is so many times shorter."""
+    """Positions at multiples of the timestep, of a run with steps ``finer`` times shorter."""
     return run(case, integrator, timestep / finer, every=finer)
 
 
@@ -264,7 +266,7 @@ def _word(verdict: Verdict) -> str:
 
 
 def table(verdicts: list[Verdict]) -> Result:
-    """A row for each kind, and what replays each false alarm and each miss."""
+    """A row for each kind, and the command for each false alarm and each miss."""
     rows: list[dict[str, Any]] = []
     for kind in KINDS:
         group = [v for v in verdicts if v.case.startswith(f"{kind}:")]
@@ -279,8 +281,8 @@ def table(verdicts: list[Verdict]) -> Result:
     alarms = [v for v in sound if v.severe]
     missed = [v for v in unsound if not v.severe]
     notes = (
-        f"sound: right to {100 * RIGHT:g} % of the movement under three inputs, full force among "
-        f"them; unsound: off by more than {100 * WRONG:g} %, or what no muscle can do",
+        f"sound: right to {100 * RIGHT:g} % of the movement under three inputs, one of them full "
+        f"force; unsound: error above {100 * WRONG:g} %, or a run that does what no muscle can",
         f"severe findings, of which check_model warns: {len(alarms)} of {len(sound)} sound models "
         f"have one (goal: 1 %), {len(missed)} of {len(unsound)} unsound ones have none (goal: 1 %)",
         f"with milder ones, 'may be off by 5 %': {sum(bool(v.findings) for v in sound)} of "

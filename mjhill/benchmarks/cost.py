@@ -1,4 +1,4 @@
-"""Cost of a step: bare plant, native muscles and ours, interleaved."""
+"""Cost of a step: without muscles, with native muscles, with mjhill's, interleaved."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def measure() -> Result:
                 )
     notes = (
         f"{ROUNDS} rounds of {STEPS} steps each, A B C A B C ..., joint in motion",
-        "no muscle: a motor for each muscle; differences and ratios are taken within a round",
+        "no muscle: a motor for each muscle; differences and ratios are those within a round",
         f"goal: at most {PER_MUSCLE:g} µs per muscle under Euler and implicitfast, and at most "
         f"{WHOLE:g} times the whole step with native muscles",
         "RK4 computes the muscle four times a step",

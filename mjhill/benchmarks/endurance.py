@@ -1,9 +1,9 @@
-"""A long run through ``mujoco.batch``: memory stays flat, nothing warns, the start is forgotten.
+"""A long run in ``mujoco.batch``: constant memory, no warnings, no effect of the start in the end.
 
-Elbows in pairs get the same random inputs. One of a pair starts steady, the other at another
-angle as ``mj_resetData`` leaves it, its muscles slack. The elbow has one place of rest for each
-input and its states follow stable equations, so the two come together exponentially; rounding
-ends it: from some step on they are the same bits.
+The two elbows of a pair get the same random excitations. One starts in steady state, the other at
+another angle with slack muscles, as after ``mj_resetData``. For each excitation the elbow has one
+stable equilibrium, so the two approach each other exponentially. Because of rounding they are
+equal bit for bit after some step.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ COUNT = 100_000_000  # steps of all elbows together
 PAIRS = 32
 GROWTH = 8.0  # [MiB] by which memory may grow after the first tenth of a run
 SHARES = {"implicitfast": 0.9, "RK4": 0.1}  # of the steps
-HOLD = 100  # steps between changes of the inputs
-SAMPLES = 50  # times that memory is looked at
+HOLD = 100  # steps between two changes of the excitations
+SAMPLES = 50  # measurements of memory in a run
 
 Progress = Callable[[float], None]
 
 
 def measure(count: int | None = None, progress: Progress | None = None) -> Result:
-    """A row for each integrator: memory, warnings, and what became of the two starts.
+    """A row for each integrator: memory, warnings, and the difference between the two starts.
 
     Args:
         count: Steps of all elbows together.
-        progress: Called now and then with the share done, 0 to 1.
+        progress: Called with the share done, from 0 to 1.
 
     Raises:
         RuntimeError: MuJoCo warned in a run.
@@ -56,11 +56,11 @@ def measure(count: int | None = None, progress: Progress | None = None) -> Resul
         rows.append(endure(integrator, round(share * (count or COUNT)), PAIRS, report))
         done += share
     notes = (
-        f"{2 * PAIRS} elbows of two muscles, inputs that change every {HOLD} steps; of each two "
-        "one starts steady, the other elsewhere with slack muscles",
+        f"{2 * PAIRS} elbows of two muscles, excitations that change every {HOLD} steps; of each "
+        "two one starts in steady state, the other elsewhere with slack muscles",
         f"growth: of resident memory after the first tenth; goal: at most {GROWTH:g} MiB",
-        "same bits: the step from which both of every pair have the same bits; apart: the largest "
-        "difference of a position, velocity or muscle state at the end",
+        "same bits: the step after which both of every pair are equal bit for bit; apart: the "
+        "largest difference of a position, velocity or muscle state at the end",
     )
     return Result(f"A long run, MuJoCo {mujoco.__version__}", rows, notes)
 
@@ -68,13 +68,13 @@ def measure(count: int | None = None, progress: Progress | None = None) -> Resul
 def endure(
     integrator: str, count: int, pairs: int = PAIRS, progress: Progress | None = None
 ) -> dict[str, Any]:
-    """Run pairs of elbows for a number of steps in all.
+    """Run pairs of elbows.
 
     Args:
         integrator: Its name in MJCF.
         count: Steps of all elbows together.
         pairs: Pairs of elbows.
-        progress: Called now and then with the share done, 0 to 1.
+        progress: Called with the share done, from 0 to 1.
 
     Raises:
         RuntimeError: MuJoCo warned.
@@ -85,7 +85,7 @@ def endure(
     with installed():
         batch = _batch(integrator, pairs)
         for change in range(changes):
-            batch.ctrl = np.repeat(_inputs(change, pairs), 2, axis=0)
+            batch.ctrl = np.repeat(_excitations(change, pairs), 2, axis=0)
             batch.step(nstep=HOLD)
             if not np.array_equal(batch.state[::2], batch.state[1::2]):
                 same = None
@@ -110,29 +110,29 @@ def endure(
 
 
 def _batch(integrator: str, pairs: int) -> Any:
-    """Elbows, every second one steady at its home angle, the others slack at other angles."""
+    """Elbows: one of each pair in steady state at home, the other slack at another angle."""
     joint = JOINTS["elbow"]
     model = joint_spec(joint).compile()
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
     batch = mujoco.batch.Batch(model, nsim=2 * pairs)
     data = mujoco.MjData(model)
     data.qpos[:] = joint.home_angle
-    data.ctrl[:] = _inputs(0, pairs)[0]
+    data.ctrl[:] = _excitations(0, pairs)[0]
     equilibrate(model, data)
     batch.bind("qpos")[::2], batch.bind("act")[::2] = data.qpos, data.act
     batch.bind("qpos")[1::2] = np.linspace(*joint.range, pairs)[:, None]
     return batch
 
 
-def _inputs(change: int, pairs: int) -> NDArray[np.float64]:
-    """Inputs of the two muscles of each pair, a third of them 0, shape (pairs, 2)."""
+def _excitations(change: int, pairs: int) -> NDArray[np.float64]:
+    """Excitations of the two muscles of each pair, a third of them 0, shape (pairs, 2)."""
     random = np.random.default_rng([19870, change])
-    levels: NDArray[np.float64] = random.uniform(-0.5, 1.0, (pairs, 2))
-    return np.maximum(levels, 0.0)
+    excitations: NDArray[np.float64] = random.uniform(-0.5, 1.0, (pairs, 2))
+    return np.maximum(excitations, 0.0)
 
 
 def _counts(batch: Any) -> NDArray[np.int_]:
-    """How often each warning was given, shape (warnings,)."""
+    """Number of warnings of each kind, shape (kinds,)."""
     counts: NDArray[np.int_] = batch.warning[:, :, 1].sum(axis=0)  # beside the last one's index
     return counts
 
@@ -145,7 +145,7 @@ def _check(batch: Any, change: int) -> None:
 
 
 def _resident() -> float:
-    """Resident memory of this process [MiB]; its peak where the system does not tell it."""
+    """Resident memory of this process [MiB]; its peak on systems without /proc."""
     pages = Path("/proc/self/statm")
     if pages.exists():
         return int(pages.read_text(encoding="ascii").split()[1]) * resource.getpagesize() / 2**20

@@ -1,4 +1,4 @@
-"""What a benchmark measured."""
+"""The result of a benchmark."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Result:
-    """A table and what to read in it.
+    """A table with notes.
 
     Attributes:
         title: What was measured.
-        rows: Rows of the table, all with the same keys. ``goal`` is what was wanted, ``met``
-            whether it was reached; None where nothing is wanted of a row.
-        notes: One line each: how it was measured, how it compares with the goal.
+        rows: Rows of the table, all with the same keys. ``met`` says whether the ``goal`` was
+            reached; both are None in rows without a goal.
+        notes: One line each: how it was measured, what the goal means.
     """
 
     title: str

@@ -1,4 +1,4 @@
-"""Start: importing mjhill, first compiled use with an empty cache and with a full one."""
+"""Start: import of mjhill, first use of compiled muscles without and with a cache."""
 
 from __future__ import annotations
 

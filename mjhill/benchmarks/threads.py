@@ -1,4 +1,4 @@
-"""``mujoco.batch`` with compiled muscles: how much two threads bring."""
+"""``mujoco.batch`` with compiled muscles: how much faster two threads are."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mjhill.engine.install import installed
 from mjhill.simulate.load import load
 
 SIMULATIONS, STEPS, ROUNDS = 256, 200, 21
-GOAL = 1.7  # speed of two threads, one being 1
+GOAL = 1.7  # speed of two threads [one thread]
 
 
 def measure() -> Result:

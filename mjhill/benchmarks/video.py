@@ -1,4 +1,4 @@
-"""Video: frames per second against MuJoCo's renderer alone, and memory against length."""
+"""Video: frames per second beside MuJoCo's renderer alone, and memory by length."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _PAGE = os.sysconf("SC_PAGE_SIZE")
 
 
 def measure() -> Result:
-    """Frame rates, interleaved, and resident memory while the last frame is made."""
+    """Frame rates, interleaved, and resident memory at the last frame."""
     model, recording = run("elbow", {}, {}, duration=4.0)
     frames = round(FPS * recording.time[-1])
     alone, ours = [], []
@@ -93,9 +93,9 @@ def measure() -> Result:
 
 
 def _render_alone(recording: Recording, frames: int) -> float:
-    """Seconds in which MuJoCo's renderer makes the same frames and throws them away.
+    """Seconds that MuJoCo's renderer needs for the same frames.
 
-    In a process of its own: MuJoCo reads MUJOCO_GL when it is imported.
+    In a new process, because MuJoCo reads MUJOCO_GL when it is imported.
     """
     angles = recording["elbow.angle"][:: len(recording) // frames][:frames]
     program = _ALONE.format(path=str(model_path("elbow")), size=SIZE, angles=angles.tolist())

@@ -14,24 +14,24 @@ from mjhill.cli.printing import json_option, print_json, print_line, print_table
 if TYPE_CHECKING:
     import mujoco
 
-SEVERE = 3  # exit code where a finding is severe
+SEVERE = 3  # exit code after a severe finding
 
 
 @click.command()
 @click.argument("model")
 @json_option
 def check(model: str, as_json: bool) -> None:
-    """Check MODEL, a joint's name or a path, and say what makes its results doubtful.
+    """Check MODEL, a joint's name or a path, for problems that make results wrong.
 
-    Exit code 0: nothing, or notes only; 3: something makes results meaningless; 2: the model is
-    refused.
+    Exit code 0: no findings, or only notes; 3: a severe finding, results are meaningless; 2: the
+    model is not accepted.
     """
     from mjhill.engine.checks import check_model
     from mjhill.engine.tendons import check_tendons
     from mjhill.simulate.load import load
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # severe findings are in the table
+        warnings.simplefilter("ignore", RuntimeWarning)  # the table shows severe findings
         loaded = load(model)
         findings = (*check_model(loaded), *check_tendons(loaded))
     looked_at = _looked_at(loaded)
@@ -59,7 +59,7 @@ def check(model: str, as_json: bool) -> None:
 
 
 def _looked_at(model: mujoco.MjModel) -> dict[str, str | int]:
-    """What was checked, in words for people."""
+    """What was checked, for people to read."""
     import mujoco
 
     from mjhill.engine.layout import elastic_joints, muscle_ids, muscle_names

@@ -1,4 +1,4 @@
-"""The commands, but for identify and reproduce, which have files of their own."""
+"""The commands, except check, identify, reproduce and view, which have their own files."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from mjhill.cli.reproduce import reproduce
 from mjhill.cli.view import view
 
 _OUT = Path("out")
-_GRAVITY = "The models of these joints have no gravity, as the movements of the paper."
+_GRAVITY = "The models of these joints have no gravity, as in the paper."
 _SUFFIXES = {"recording": (".csv", ".npz"), "plot": (".png",), "video": (".mp4", ".gif")}
 
 
 _OUTPUT_HELP = "The {}; by default out/{}-MODEL.{}."
-_FRAMES = 1_000_000  # of a film, nine hours at 30 a second
+_FRAMES = 1_000_000  # at most in a film: nine hours at 30 per second
 
 
 @click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"]})
@@ -58,8 +58,8 @@ def _inputs_options(function: Any) -> Any:
         "-e",
         multiple=True,
         metavar="MUSCLE=EXCITATION[@START[:END]]",
-        help="Excitation of a muscle, 0 to 1; several add up. Without any, and without "
-        "--torque: the movement of demo.",
+        help="Excitation of a muscle, 0 to 1; several add up. Without --excite and --torque: "
+        "the movement of demo.",
     )
     return excite(torque(function))
 
@@ -75,7 +75,7 @@ muscle_option = click.option(
 @click.option("--output", "-o", type=click.Path(path_type=Path), default=_OUT, help="Folder.")
 @json_option
 def demo(output: Path, as_json: bool) -> None:
-    """Run the elbow through its scripted movement; write video, plot and recording."""
+    """Run the scripted movement of the elbow; write video, plot and recording."""
     files = {
         "video": output / "demo-elbow.mp4",
         "plot": output / "demo-elbow.png",
@@ -88,7 +88,7 @@ def demo(output: Path, as_json: bool) -> None:
 @main.command("list")
 @json_option
 def list_(as_json: bool) -> None:
-    """List the joints that come with mjhill."""
+    """List the joints of mjhill."""
     from mjhill.joints.reader import JOINTS
 
     rows = [
@@ -107,7 +107,7 @@ def list_(as_json: bool) -> None:
 
 @main.command()
 @click.argument("model")
-@click.option("--mjcf", is_flag=True, help="Print the MJCF of the muscles instead.")
+@click.option("--mjcf", is_flag=True, help="Print the MJCF of the muscles.")
 @muscle_option
 @json_option
 def info(model: str, mjcf: bool, muscle: str | None, as_json: bool) -> None:
@@ -128,7 +128,7 @@ def info(model: str, mjcf: bool, muscle: str | None, as_json: bool) -> None:
 @click.argument("model")
 @_inputs_options
 @muscle_option
-@click.option("--duration", "-d", default=4.0, show_default=True, help="Length [s].")
+@click.option("--duration", "-d", default=4.0, show_default=True, help="Duration [s].")
 @click.option(
     "--output",
     "-o",
@@ -158,7 +158,7 @@ def run(
 @click.argument("model")
 @_inputs_options
 @muscle_option
-@click.option("--duration", "-d", default=4.0, show_default=True, help="Length [s].")
+@click.option("--duration", "-d", default=4.0, show_default=True, help="Duration [s].")
 @click.option(
     "--output",
     "-o",
@@ -166,9 +166,11 @@ def run(
     help=_OUTPUT_HELP.format("film, .mp4 or .gif", "video", "mp4"),
 )
 @click.option("--fps", default=30.0, show_default=True, help="Frames per second.")
-@click.option("--speed", default=1.0, show_default=True, help="1 is real time, less is slow.")
+@click.option(
+    "--speed", default=1.0, show_default=True, help="1 is real time, 0.1 is ten times slower."
+)
 @click.option("--size", nargs=2, type=int, default=(1280, 720), show_default=True)
-@click.option("--camera", help="Camera of the model.")
+@click.option("--camera", help="Name of a camera of the model.")
 @json_option
 def video(
     model: str,
@@ -189,9 +191,11 @@ def video(
 @main.command()
 @click.argument("models", nargs=-1, metavar="[MODEL]...")
 @click.option("--output", "-o", type=click.Path(path_type=Path), default=_OUT / "compare",
-              show_default=True, help="Folder, with a folder for each model in it.")  # fmt: skip
+              show_default=True, help="Folder; each model gets a folder in it.")  # fmt: skip
 @click.option("--video/--no-video", default=True, show_default=True)
-@click.option("--cost/--no-cost", default=True, show_default=True, help="Time the steps too.")
+@click.option(
+    "--cost/--no-cost", default=True, show_default=True, help="Also measure the time of a step."
+)
 @muscle_option
 @json_option
 def compare(
@@ -204,15 +208,15 @@ def compare(
 ) -> None:
     """Compare each MODEL's muscles with MuJoCo's own on the same plant and inputs.
 
-    A MODEL is a joint's name or a path; without any it is the elbow. With --json a list, one item
-    for each model.
+    A MODEL is a joint's name or a path; the default is the elbow. --json prints a list with one
+    item for each model.
     """
     from mjhill import comparison
 
     models = tuple(dict.fromkeys(models)) or ("elbow",)
     folders = _folders(models, output)
     for model in models:
-        comparison.check(model, muscle)  # before the first one takes its time
+        comparison.check(model, muscle)  # before the first comparison, which takes time
     results = []
     for model in models:
         result, paths = _compare(model, folders[model], video, cost, muscle)
@@ -231,8 +235,8 @@ def compare(
     type=click.IntRange(1),
     help="sweep: systems of each kind; fuzz, checks: models; endurance: steps.",
 )
-@click.option("--kind", multiple=True, help="sweep, fuzz: kind of model; may be given again.")
-@click.option("--case", metavar="KIND:NUMBER", help="sweep, fuzz, checks: one model again.")
+@click.option("--kind", multiple=True, help="sweep, fuzz: kind of model; several are possible.")
+@click.option("--case", metavar="KIND:NUMBER", help="sweep, fuzz, checks: run one model again.")
 @json_option
 def bench(
     names: tuple[str, ...],
@@ -241,14 +245,14 @@ def bench(
     case: str | None,
     as_json: bool,
 ) -> None:
-    """Measure accuracy, cost, threads, start and video, or those of NAMES.
+    """Run the benchmarks NAMES: accuracy, balance, cost, threads, start, video; by default all.
 
-    All of them take about 5 minutes on two cores, most of it video, which a graphics card makes
-    shorter. Each table says what was wanted (goal) and whether it was met.
+    All of them take about 5 minutes on two cores. Most of that is video, which a graphics card
+    makes faster. The tables show goals and whether they were met.
 
-    By name only, on two cores: sweep, random systems against the reference solver (2 minutes);
-    fuzz, 100,000 models with anything that is accepted (5 minutes); checks, sound and unsound
-    models past check_model (3 minutes); endurance, 10⁸ steps (2 minutes).
+    More benchmarks, one at a time, with their time on two cores: sweep, random systems against
+    the reference solver (2 minutes); fuzz, 100,000 random models (5 minutes); checks, check_model
+    on sound and unsound models (3 minutes); endurance, 10⁸ steps (2 minutes).
     """
     from mjhill import benchmarks
 
@@ -256,7 +260,7 @@ def bench(
     if (count or kind or case) and not long:
         listed = ", ".join(benchmarks.LONG)
         raise click.UsageError(
-            f"--count, --kind and --case go with mjhill bench and one of {listed}"
+            f"--count, --kind and --case need exactly one of these benchmarks: {listed}"
         )
     chosen = names if long else benchmarks.check_names(names)
     if not (count or case):
@@ -278,14 +282,14 @@ def bench(
 
 
 def _folders(models: tuple[str, ...], output: Path) -> dict[str, Path]:
-    """A folder for each model, by its name."""
+    """The folder of each model."""
     folders = {model: output / Path(model).stem for model in models}
     for model, folder in folders.items():
         alike = [other for other in models if folders[other] == folder and other != model]
         if alike:
             raise ValueError(
-                f"{model} and {alike[0]} would both be written to {folder}; compare them one by "
-                "one, each with an --output of its own"
+                f"{model} and {alike[0]} would both be written to {folder}; compare each "
+                "of them with another --output"
             )
     return folders
 
@@ -293,7 +297,7 @@ def _folders(models: tuple[str, ...], output: Path) -> dict[str, Path]:
 def _compare(
     model: str, folder: Path, video: bool, cost: bool, muscle: str | None
 ) -> tuple[Any, list[Path]]:
-    """Compare one model and write its folder."""
+    """Compare one model and write the files."""
     from dataclasses import replace
 
     from mjhill import comparison
@@ -331,7 +335,7 @@ def _film(
     muscle: str | None = None,
     **video: Any,
 ) -> None:
-    """Run a model from its home pose, write what ``files`` names and print what came out."""
+    """Run a model from its home pose, write the ``files`` and print a summary."""
     from mjhill.files import check_writable
     from mjhill.simulate import scripted
     from mjhill.simulate.load import load
@@ -368,35 +372,35 @@ def _film(
 
 
 def _check_frames(duration: float, fps: float, speed: float) -> None:
-    frames = fps * duration / speed if speed > 0 else 0.0  # what is no speed, render refuses
+    frames = fps * duration / speed if speed > 0 else 0.0  # render rejects other speeds
     if math.isfinite(duration) and frames > _FRAMES:
         raise ValueError(
-            f"a film of {duration:g} s at {speed:g} times its speed and {fps:g} frames per second "
+            f"a film of {duration:g} s at speed {speed:g} and {fps:g} frames per second "
             f"has {frames:.4g} frames; at most {_FRAMES:,} are allowed: lower --duration or "
             "--fps, or raise --speed"
         )
 
 
 def _parse(items: tuple[str, ...]) -> dict[str, Any]:
-    """Signals from ``NAME=LEVEL[@START[:END]]``."""
+    """Signals by name, from ``NAME=VALUE[@START[:END]]``."""
     from mjhill.simulate.signals import Signal, as_signal, pulse, step
 
     signals: dict[str, Signal] = {}
     for item in items:
         name, found, text = item.partition("=")
-        level, at, span = text.partition("@")
+        value, at, span = text.partition("@")
         start, colon, end = span.partition(":")
         try:
             if not found:
                 raise ValueError
             if colon:
                 begin = float(start)
-                signal = pulse(float(level), begin, float(end) - begin)
+                signal = pulse(float(value), begin, float(end) - begin)
             else:
-                signal = step(float(level), float(start)) if at else as_signal(float(level))
+                signal = step(float(value), float(start)) if at else as_signal(float(value))
         except ValueError:
             raise ValueError(
-                f"input {item!r} must read NAME=LEVEL, NAME=LEVEL@START or NAME=LEVEL@START:END, "
+                f"input {item!r} must be NAME=VALUE, NAME=VALUE@START or NAME=VALUE@START:END, "
                 "such as elbow_flexor=0.5@0.1:0.3 (times in s, END after START)"
             ) from None
         signals[name] = signals[name] + signal if name in signals else signal

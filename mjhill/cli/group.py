@@ -1,7 +1,7 @@
-"""The group of commands: how each one ends, whatever happens.
+"""The group of commands: error messages and exit codes.
 
 Exit codes: 0 done, 1 the machine or the run failed, 2 the input was wrong, 130 Ctrl-C,
-141 nobody reads the output any more, 143 SIGTERM.
+141 the reader of the output has ended, 143 SIGTERM.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from mjhill.cli.printing import make_printable, plain
 
 
 class Group(click.Group):
-    """Turns the errors that mjhill raises for people into one line and an exit code."""
+    """Turns errors into one line and an exit code."""
 
     def main(self, *args: Any, **options: Any) -> Any:
-        """Run the command that the arguments name; ends in SystemExit."""
+        """Run the command of the arguments; ends in SystemExit."""
         _open_standard_streams()
         make_printable(sys.stdout, sys.stderr)
         with interrupts.handled(), warnings.catch_warnings():
@@ -44,30 +44,30 @@ class Group(click.Group):
 
 @contextmanager
 def _reported() -> Iterator[None]:
-    """Say in one line what went wrong, and end with the exit code for it."""
+    """Print an error in one line, and end with its exit code."""
     try:
         try:
             yield
-            sys.stdout.flush()  # a full disk or a closed pipe shows here at the latest
+            sys.stdout.flush()  # raises if the disk is full or the pipe is closed
         finally:
-            interrupts.check()  # whatever else went wrong, that is why
+            interrupts.check()  # an interrupt is the cause of any other error
     except (click.ClickException, click.exceptions.Exit, click.exceptions.Abort):
         raise  # click's own endings; the last two are RuntimeErrors
     except KeyboardInterrupt:
-        # Python notes an interrupt of code made from text, such as a dataclass, and would kill
-        # itself at its exit; other such code takes the note away
+        # After an interrupt in code made from text, such as a dataclass, Python would kill
+        # itself at exit; running other such code prevents it
         exec("")
         _end("interrupted", code=128 + signal.SIGINT)
     except BrokenPipeError:
         _leave_stdout()
         sys.exit(128 + signal.SIGPIPE)
     except MemoryError as error:
-        _end(f"error: out of memory; ask for less, such as a shorter run ({error})", code=1)
+        _end(f"error: out of memory; try a shorter run ({error})", code=1)
     except (ValueError, TypeError, KeyError) as error:
         _end(f"error: {error.args[0] if isinstance(error, KeyError) else error}", code=2)
     except (RuntimeError, OSError) as error:
         if isinstance(error, OSError):
-            _leave_stdout()  # which may be what could not be written
+            _leave_stdout()  # standard output may be what could not be written
         _end(f"error: {error}", code=1)
 
 
@@ -78,13 +78,13 @@ def _end(message: str, code: int) -> NoReturn:
 
 
 def _leave_stdout() -> None:
-    """Let what is still to be written to standard output go nowhere, or Python complains."""
+    """Discard the rest of standard output; Python would complain at exit."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _open_standard_streams() -> None:
-    """Open what the caller has closed, or the first file written would become the output."""
+    """Open closed standard streams; otherwise the first file written would become the output."""
     for number in (0, 1, 2):
         try:
             os.fstat(number)

@@ -17,20 +17,22 @@ from mjhill.cli.printing import (
     progress_bar,
 )
 
-LENGTH = "all take 1 to 2 minutes on two cores, and those that are there already no time"
+LENGTH = "all take 1 to 2 minutes on two cores; finished parts are not run again"
 
 
 @click.command()
-@click.option("--only", multiple=True, metavar="ID", help="Only this experiment.")
+@click.option(
+    "--only", multiple=True, metavar="ID", help="Run only this experiment; several are possible."
+)
 @click.option(
     "--joint", "joints", multiple=True, metavar="NAME",
-    help="On this joint; without any, each experiment on its own ones.",
+    help="Run on this joint; by default each experiment runs on its own joints.",
 )  # fmt: skip
 @click.option("--video/--no-video", default=True, show_default=True)
-@click.option("--fresh", is_flag=True, help="Run again what is there already.")
+@click.option("--fresh", is_flag=True, help="Run finished parts again.")
 @click.option(
     "--jobs", "-j", type=click.IntRange(min=1),
-    help="How many to run at once; by default a core each, up to 4.",
+    help="How many to run at once; by default one for each core, at most 4.",
 )  # fmt: skip
 @click.option(
     "--output", "-o", type=click.Path(path_type=Path), default=Path("out", "reproduce"),
@@ -46,12 +48,12 @@ def reproduce(
     output: Path,
     as_json: bool,
 ) -> None:
-    """Run the experiments of Winters & Stark (1987) and say which of the paper's claims hold.
+    """Run the experiments of Winters & Stark (1987) and show which of the paper's claims hold.
 
-    All of them take 1 to 2 minutes on two cores. Numbers, figures and videos go to the folder,
-    with a page, report.html, that shows them all. What is there already is not run again, unless
-    its sources or parameters have changed. The exit code is 1 where something failed and 130
-    after an interruption; what was finished by then is kept, and reported.
+    All of them take 1 to 2 minutes on two cores. The folder gets numbers, figures and videos, and
+    a page, report.html, that shows them all. Finished parts are not run again, unless sources or
+    parameters have changed. The exit code is 1 if something failed, and 130 after an interruption;
+    finished parts are kept and reported.
     """
     from mjhill.report import CATALOGUE, report_of, select, write_report
     from mjhill.report import reproduce as run

@@ -36,7 +36,7 @@ class _Line:
 
 @dataclass(frozen=True)
 class _Axis:
-    """One of the stacked axes; ``key`` explains styles and colours that are only its own."""
+    """One of the stacked axes; ``key`` is the legend of styles and colours used only here."""
 
     label: str
     lines: tuple[_Line, ...]
@@ -51,15 +51,15 @@ def plot_recording(
     muscles: Sequence[str] | None = None,
     title: str | None = None,
 ) -> Path:
-    """Draw a recording as stacked time series: joints, then what drives and fills each muscle.
+    """Draw a recording as stacked time series: first joints, then muscles.
 
     Args:
-        recording: What to draw. A series that it lacks is left out, such as the contractile
-            element of a native muscle.
-        path: The picture, ``.png``; it appears whole or not at all.
-        joints: Names of the joints to draw; all without it.
-        muscles: Names of the muscles to draw; all without it.
-        title: Heading; the model's name without it.
+        recording: What to draw. Series that it lacks are left out, such as the velocity of the
+            contractile element of a native muscle.
+        path: The picture, ``.png``; it is written completely or not at all.
+        joints: Names of the joints to draw; by default all.
+        muscles: Names of the muscles to draw; by default all.
+        title: Heading; by default the model's name.
 
     Returns:
         The path written.
@@ -90,10 +90,10 @@ def plot_overlay(
 
     Args:
         recordings: Recordings by the label that the legend shows.
-        path: The picture, ``.png``; it appears whole or not at all.
-        joints: Names of the joints to draw; all without it.
-        muscles: Names of the muscles to draw; all without it.
-        title: Heading; none without it.
+        path: The picture, ``.png``; it is written completely or not at all.
+        joints: Names of the joints to draw; by default all.
+        muscles: Names of the muscles to draw; by default all.
+        title: Heading; by default none.
 
     Returns:
         The path written.
@@ -124,7 +124,7 @@ def plot_overlay(
 def _choose(
     recording: Recording, joints: Sequence[str] | None, muscles: Sequence[str] | None
 ) -> tuple[list[str], list[str]]:
-    """The joints and muscles asked for, or all there are."""
+    """The requested joints and muscles; by default all."""
     chosen = []
     for kind, wanted in (("joint", joints), ("muscle", muscles)):
         known = _known(recording, kind)
@@ -143,7 +143,7 @@ def _known(recording: Recording, kind: str) -> list[str]:
 
 
 def _muscle_colours(recording: Recording, muscles: Sequence[str]) -> dict[str, _Colour]:
-    """A muscle's colour depends on the recording alone, whichever others are drawn."""
+    """Colours of muscles; they depend only on the recording, not on the choice of muscles."""
     known = _known(recording, "muscle")
     return {name: MUSCLE_COLOURS[known.index(name) % len(MUSCLE_COLOURS)] for name in muscles}
 
@@ -169,9 +169,9 @@ def _joint_axes(recording: Recording, joints: Sequence[str], style: Any) -> Iter
 
 
 def _muscle_axes(recording: Recording, muscles: Sequence[str]) -> Iterator[_Axis]:
-    drive = (("u", _STYLES[2], 1.2), ("n", _STYLES[1], 1.2), ("a", _STYLES[0], 1.5))
+    shares = (("u", _STYLES[2], 1.2), ("n", _STYLES[1], 1.2), ("a", _STYLES[0], 1.5))
     lines, key = [], []
-    for suffix, style, width in drive:
+    for suffix, style, width in shares:
         found = [
             _Line(muscle, recording.time, recording[f"{muscle}.{suffix}"], colour, style, width)
             for muscle, colour in _muscle_colours(recording, muscles).items()
@@ -214,7 +214,7 @@ def _draw(
     title: str,
     path: str | Path,
 ) -> Path:
-    """Stack the axes; colours and recordings are explained above them, the rest beside."""
+    """Stack the axes; a legend of muscles and recordings stands above them."""
     path = Path(path)
     if path.suffix != ".png":
         raise ValueError(f"a plot must end in .png, got {str(path)!r}")
@@ -233,7 +233,7 @@ def _draw(
     handles = [Line2D([], [], color=colour, lw=3, label=m) for m, colour in colours.items()]
     handles += [Line2D([], [], color="black", ls=s, label=label) for label, s in labels]
     if handles:
-        # the heading belongs to the legend, so that the two never meet
+        # the heading is part of the legend, so that they never overlap
         legend = figure.legend(
             handles=handles, loc="outside upper center", ncols=4, frameon=False,
             title=title, title_fontsize=12,
@@ -247,11 +247,11 @@ def _draw(
     return path
 
 
-def take_literally(figure: Any) -> None:
-    """Let no text of a figure be a formula: names and titles may hold dollar signs."""
+def take_literally(artist: Any) -> None:
+    """Show dollar signs in the texts of a figure or legend as they are: no formulas."""
     from matplotlib.text import Text
 
-    for text in figure.findobj(Text):
+    for text in artist.findobj(Text):
         text.set_parse_math(False)
 
 
@@ -262,7 +262,7 @@ def _draw_axis(plot: Any, axis: _Axis) -> None:
         plot.plot(line.time, line.values, color=line.colour, ls=line.style, lw=line.width)
     plot.set_ylabel(axis.label)
     plot.margins(x=0)
-    if axis.label.endswith("[-]"):  # excitation and activation: a constant one is no curve
+    if axis.label.endswith("[-]"):  # excitation and activation: show a constant as a flat line
         low = min(0.0, *(float(line.values.min()) for line in axis.lines))
         high = max(0.0, *(float(line.values.max()) for line in axis.lines))
         margin = 0.05 * (high - low or 1.0)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mjhill.draw.bellies import Colour, DrawnMuscle
 from mjhill.draw.panels import Box, Panel
+from mjhill.draw.plot import take_literally
 from mjhill.simulate.recording import Recording
 
 _JOINT_COLOURS = ((0.17, 0.17, 0.20), (0.45, 0.33, 0.60), (0.30, 0.52, 0.50), (0.60, 0.50, 0.30))
@@ -269,7 +270,8 @@ def _draw_axes(
         spine.set_visible(name in ("left", "bottom"))
         spine.set(color=_SOFT, linewidth=points)
     if plot.named:
-        plane.legend(fontsize=letters(12), loc="upper right", frameon=False, ncols=2)
+        key = plane.legend(fontsize=letters(12), loc="upper right", frameon=False, ncols=2)
+        take_literally(key)
     return plane
 
 

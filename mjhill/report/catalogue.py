@@ -18,10 +18,10 @@ class Entry:
 
     Attributes:
         id: Its name on the command line.
-        path: Its function, as ``module:name``; the module is imported when it is run.
-        joints: The joints that it is made on where none are asked for.
-        filmed: Whether its run is worth a video.
-        anywhere: Whether it can be made on other joints too.
+        path: Its function, as ``module:name``; the module is imported for the run.
+        joints: The joints that it runs on by default.
+        filmed: Whether its run is filmed.
+        anywhere: Whether it can run on other joints too.
     """
 
     id: str
@@ -36,7 +36,7 @@ class Entry:
         return self.path.partition(":")[0]
 
     def function(self) -> Callable[..., Any]:
-        """The experiment: called with a joint's name and ``progress``, it gives a ``Result``.
+        """The experiment: takes a joint's name and ``progress``, returns a ``Result``.
 
         Raises:
             ImportError: There is no such module.
@@ -50,19 +50,19 @@ class Entry:
 
 @dataclass(frozen=True)
 class Part:
-    """One experiment on one joint: what is run, kept and shown as a whole."""
+    """One experiment on one joint: it is run, kept and shown as a whole."""
 
     entry: Entry
     joint: str
 
     @property
     def name(self) -> str:
-        """Its name, and the stem of its files."""
+        """Its name, which is also the stem of its files."""
         return f"{self.entry.id}-{self.joint}"
 
     @property
     def command(self) -> str:
-        """What runs it alone."""
+        """The command that runs this part only."""
         return f"mjhill reproduce --only {self.entry.id} --joint {self.joint}"
 
 
@@ -90,16 +90,16 @@ CATALOGUE = (
 def select(
     catalogue: Sequence[Entry], only: Sequence[str] = (), joints: Sequence[str] = ()
 ) -> list[Part]:
-    """The parts that are asked for, in the order of the catalogue.
+    """The requested parts, in the order of the catalogue.
 
     Args:
-        catalogue: The experiments there are.
-        only: Ids of the experiments wanted; all without any.
-        joints: Names of the joints to make each on; each experiment's own without any.
+        catalogue: All experiments.
+        only: Ids of the requested experiments; by default all.
+        joints: Names of the joints to run on; by default each experiment's own.
 
     Raises:
-        ValueError: There is no such experiment or joint, or an experiment wanted cannot be made
-            on the joints; the message lists those there are.
+        ValueError: There is no such experiment or joint, or a requested experiment cannot run
+            on the joints; the message lists what exists.
     """
     known = [entry.id for entry in catalogue]
     for kind, asked, there in (("experiment", only, known), ("joint", joints, list(JOINTS))):
@@ -109,7 +109,7 @@ def select(
     chosen = [entry for entry in catalogue if not only or entry.id in only]
     for entry in chosen:
         if only and joints and not _joints(entry, joints):
-            raise ValueError(f"{entry.id} can be made on {', '.join(entry.joints)} only")
+            raise ValueError(f"{entry.id} runs on {', '.join(entry.joints)} only")
     return [Part(entry, joint) for entry in chosen for joint in _joints(entry, joints)]
 
 

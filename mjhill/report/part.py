@@ -1,4 +1,4 @@
-"""One part made: the experiment run, its figure drawn, its run filmed."""
+"""Makes one part: runs the experiment, draws its figure, films its run."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ Progress = Callable[[float], None]
 
 _DPI = 200  # of a figure [1/inch]: two pixels for each of a page that is 900 wide
 _FILM = {"size": (640, 360), "fps": 24}
-_LONGEST = 4.0  # film [s]
+_LONGEST = 4.0  # of a film [s]
 _SPEEDS = (10, 5, 2, 1, 0.5, 0.25, 0.2, 0.1, 0.05, 0.02, 0.01)
-_MEASURED = 0.7  # share of the work that is done before the film [-]
+_BEFORE_FILM = 0.7  # share of the work [-]
 
 
 def make(
@@ -32,16 +32,16 @@ def make(
     """Run an experiment on a joint and write its files into a folder.
 
     Returns:
-        Why there is no film where there should be one; None where all is well.
+        Why the film is missing; None if it is there or none was asked for.
 
     Raises:
         Exception: Whatever the experiment raises.
     """
     function = part.entry.function()
     started = time.perf_counter()
-    result: Result = function(part.joint, progress=lambda share: progress(_MEASURED * share))
+    result: Result = function(part.joint, progress=lambda share: progress(_BEFORE_FILM * share))
     seconds = time.perf_counter() - started
-    progress(_MEASURED)
+    progress(_BEFORE_FILM)
     numbers = {
         "id": part.entry.id,
         **plain(result.as_dict()),
@@ -55,7 +55,7 @@ def make(
     if video and part.entry.filmed:
         path = folder / f"{part.name}{FILM}"
         film = _film(
-            part.joint, result.film(), path, lambda share: progress(_MEASURED + 0.3 * share)
+            part.joint, result.film(), path, lambda share: progress(_BEFORE_FILM + 0.3 * share)
         )
     write_json(folder / f"{part.name}{NUMBERS}", {**numbers, "film": film})
     progress(1.0)
@@ -63,10 +63,10 @@ def make(
 
 
 def plain(value: Any, name: str = "result") -> Any:
-    """A value with numpy's numbers as Python's.
+    """A value with Python's numbers in place of numpy's.
 
     Raises:
-        ValueError: A number is not finite, which JSON does not have and no measure should be.
+        ValueError: A number is not finite; JSON has no such numbers.
     """
     if isinstance(value, dict):
         return {key: plain(item, f"{name}.{key}") for key, item in value.items()}
@@ -80,13 +80,13 @@ def plain(value: Any, name: str = "result") -> Any:
 
 
 def film_speed(duration: float) -> float:
-    """Recorded time by film time [-] at which a run of ``duration`` [s] can be followed."""
+    """Recorded time per film time [-] at which the eye can follow a run of ``duration`` [s]."""
     slow_enough = [speed for speed in _SPEEDS if duration <= speed * _LONGEST]
     return float(min(slow_enough, default=duration / _LONGEST))
 
 
 def _options(function: Callable[..., Any]) -> dict[str, Any]:
-    """What an experiment takes beside the joint, and the values that it was run with."""
+    """Parameters of an experiment other than the joint, with the values of this run."""
     parameters = list(inspect.signature(function).parameters.values())[1:]
     return {
         item.name: _shown(item.default)
@@ -96,7 +96,7 @@ def _options(function: Callable[..., Any]) -> dict[str, Any]:
 
 
 def _shown(value: Any) -> Any:
-    """A value as JSON can have it, else as Python writes it."""
+    """A value as JSON writes it, or else as Python does."""
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, list | tuple):
@@ -105,7 +105,7 @@ def _shown(value: Any) -> Any:
 
 
 def _draw(result: Result, path: Path) -> dict[str, int]:
-    """Draw the figure and give its width and height [px]."""
+    """Draw the figure; gives its width and height [px]."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=result.size, layout="constrained")
@@ -118,7 +118,7 @@ def _draw(result: Result, path: Path) -> dict[str, int]:
 def _film(
     joint: str, recording: Recording | None, path: Path, progress: Progress
 ) -> dict[str, Any]:
-    """Film a run and say how fast it is shown; without OpenGL or encoder the numbers remain."""
+    """Film a run; gives the speed, or the problem: numbers are kept even without OpenGL."""
     if recording is None:
         return {"nothing": "the experiment has no run to film on this joint"}
     from mjhill.draw import View, render

@@ -1,34 +1,71 @@
-"""Parts run, several at once, each in a process of its own; what is finished is kept."""
+"""Parts run, several at once, each in its own process; what is finished is kept.
+
+A thread waits for each process. Not one pool of processes: a crash would break the pool and lose
+the other parts, and Python before 3.14 cannot stop a pool's processes. Signals raise exceptions
+only in the main thread, so none interrupts the start of a process or the move of its files.
+"""
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import shutil
+import signal
+import sys
+import threading
+import time
+import traceback
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
-from multiprocessing.connection import wait
+from multiprocessing import connection, resource_tracker
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 from mjhill import interrupts
 from mjhill.report.catalogue import CATALOGUE, Entry, Part, every_part, select
 from mjhill.report.fingerprint import fingerprint
-from mjhill.report.process import Failure, Worker, start, uninterrupted
+from mjhill.report.part import make
 from mjhill.report.store import Store, is_finished
+
+_PATIENCE = 3.0  # time that a process gets to end before it is killed [s]
+_INTERVAL = 0.1  # between two looks at a process, and two reports of progress [s]
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a part could not be made.
+
+    Attributes:
+        reason: In one line.
+        details: The traceback, where there is one.
+    """
+
+    reason: str
+    details: str = ""
+
+
+@dataclass(frozen=True)
+class Success:
+    """A part was made; ``problem`` says what it lacks, such as a film."""
+
+    problem: str | None
+
 
 _INTERRUPTED = Failure("interrupted before it was done")
 
 
 @dataclass
 class Outcome:
-    """What a run of the catalogue has come to.
+    """What a run of the catalogue gave.
 
     Attributes:
         folder: Where the files are.
         parts: Numbers of each part that is there, new or kept, in the order of the catalogue.
-        missing: Parts that were asked for and are not there, with the reason.
+        missing: The requested parts that are not there, with the reason.
         problems: What parts that are there lack, such as a film that could not be made.
-        ran: Names of the parts that were run, the others having been there before.
+        ran: Names of the parts that were run; the others were there before.
         interrupted: Whether it was ended before all was done.
     """
 
@@ -41,7 +78,7 @@ class Outcome:
 
     @property
     def exit_code(self) -> int:
-        """0 where all is there, 1 where something failed, 130 after an interruption."""
+        """0 if all is there, 1 if something failed, 130 after an interruption."""
         if self.interrupted:
             return 130
         return 1 if self.missing or self.problems else 0
@@ -58,18 +95,18 @@ def reproduce(
     jobs: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Outcome:
-    """Run the paper's experiments, but for those whose numbers are in the folder already.
+    """Run the paper's experiments, except those whose numbers are in the folder already.
 
-    A part that fails or an interruption leaves the others as they are; the outcome tells of it.
+    If a part fails, or the run is interrupted, the other parts are kept, and the outcome says so.
 
     Args:
-        folder: Where to keep what each part gives; made where it is not there.
+        folder: Where to keep the files of each part; it is made if it does not exist.
         catalogue: The experiments.
-        only: Ids of those wanted; all without any.
-        joints: Joints to make each on; each experiment's own without any.
+        only: Ids of the experiments to run; by default all.
+        joints: Joints to run each experiment on; by default each experiment's own.
         video: Whether to film what moves.
-        fresh: Whether to run all again.
-        jobs: How many to run at once; as many as there are cores, but no more than 4, without it.
+        fresh: Whether to run again what is there already.
+        jobs: How many to run at once; by default one for each core, but at most 4.
         progress: Called with the share done, from 0 to 1.
 
     Raises:
@@ -82,25 +119,34 @@ def reproduce(
         raise ValueError(f"jobs must be at least 1, got {jobs}")
     store, outcome = Store(Path(folder).absolute()), Outcome(Path(folder))
     store.open()
-    prints = _fingerprints(catalogue)
-    waiting = []
+    hashes = _fingerprints(catalogue)
+
+    def kept(part: Part) -> dict[str, Any] | None:
+        word = hashes[part.entry.id]
+        return None if isinstance(word, Failure) else store.read(part, word)
+
+    ends: dict[Part, Success | Failure] = {}
     for part in wanted:
-        word = prints[part.entry.id]
+        word = hashes[part.entry.id]
         if isinstance(word, Failure):
-            outcome.missing[part] = word
-        elif fresh or not is_finished(part, store.read(part, word), video=video):
-            waiting.append(part)
-    run = _Run(store, outcome, prints, video, jobs, progress or (lambda share: None))
-    run.all(waiting, done=len(wanted) - len(waiting))
-    # side by side they end in any order
-    outcome.ran = [part.name for part in wanted if part.name in outcome.ran]
-    outcome.missing = {p: outcome.missing[p] for p in wanted if p in outcome.missing}
+            ends[part] = word
+        elif fresh or not is_finished(part, kept(part), video=video):
+            ends[part] = _INTERRUPTED  # until it ends otherwise
+    waiting = [part for part, end in ends.items() if end is _INTERRUPTED]
+    run = _Run(store, hashes, video, progress or (lambda share: None))
+    outcome.interrupted = run.all(waiting, jobs, len(wanted), ends)
+    for part, end in ends.items():
+        if isinstance(end, Failure):
+            outcome.missing[part] = end
+        else:
+            outcome.ran.append(part.name)
+            if end.problem:
+                outcome.problems[part] = end.problem
     for part in every_part(catalogue):
-        word = prints[part.entry.id]
-        numbers = store.read(part, word) if isinstance(word, str) else None
+        numbers = kept(part)
         if numbers is None:
             continue
-        if outcome.missing.get(part) is _INTERRUPTED:  # what was there before is as good
+        if outcome.missing.get(part) is _INTERRUPTED:  # the older numbers are still valid
             outcome.problems[part] = outcome.missing.pop(part).reason
         if part not in outcome.missing:
             outcome.parts.append((part, numbers))
@@ -109,71 +155,158 @@ def reproduce(
 
 def _fingerprints(catalogue: Sequence[Entry]) -> dict[str, str | Failure]:
     """The fingerprint of each experiment, or why it has none."""
-    prints: dict[str, str | Failure] = {}
+    hashes: dict[str, str | Failure] = {}
     for entry in catalogue:
         try:
-            prints[entry.id] = fingerprint(entry.module)
+            hashes[entry.id] = fingerprint(entry.module)
         except (ImportError, SyntaxError, OSError) as error:
-            prints[entry.id] = Failure(f"{type(error).__name__}: {error}")
-    return prints
+            hashes[entry.id] = Failure(f"{type(error).__name__}: {error}")
+    return hashes
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Run:
-    """The parts that wait, and the processes of those that do not."""
+    """What the threads of one run share."""
 
     store: Store
-    outcome: Outcome
-    prints: dict[str, Any]
+    hashes: dict[str, Any]
     video: bool
-    jobs: int
     progress: Callable[[float], None]
-    running: dict[Part, tuple[Worker, ExitStack]] = field(default_factory=dict)
+    shares: dict[Part, float] = field(default_factory=dict)
+    stopping: threading.Event = field(default_factory=threading.Event)
 
-    def all(self, waiting: list[Part], done: int) -> None:
-        """Run parts until none is left, or until an interruption."""
-        queue, total = list(waiting), done + len(waiting)
+    def all(
+        self, waiting: list[Part], jobs: int, total: int, ends: dict[Part, Success | Failure]
+    ) -> bool:
+        """Run parts, write how each one ended into ``ends``; gives whether it was interrupted."""
+        interrupted = False
+        futures: dict[Future[Success | Failure], Part] = {}
+        resource_tracker.ensure_running()  # its start unblocks SIGINT; so not in a thread below
+        # Ctrl-C reaches all processes of a terminal, but only this one answers it: a process
+        # inherits the blocked signal from the thread that starts it
+        threads = ThreadPoolExecutor(
+            jobs, initializer=signal.pthread_sigmask, initargs=(signal.SIG_BLOCK, {signal.SIGINT})
+        )
         try:
-            while queue or self.running:
-                while queue and len(self.running) < self.jobs:
-                    self._start(queue[0])
-                    del queue[0]
-                shares = [worker.share for worker, _ in self.running.values()]
-                self.progress((total - len(queue) - len(shares) + sum(shares)) / total)
-                self._listen()
+            for part in waiting:
+                futures[threads.submit(self._make, part)] = part
+            running = set(futures)
+            while running:
+                done = total - len(waiting) + sum(self.shares.values())
+                self.progress(done / total)
+                ended, running = wait(running, _INTERVAL, FIRST_COMPLETED)
+                for future in ended:
+                    future.result()  # raises what a full disk has raised there
             self.progress(1.0)
         except KeyboardInterrupt:
             interrupts.acknowledge()  # the report comes next
-            self.outcome.interrupted = True
-            self.outcome.missing |= dict.fromkeys([*self.running, *queue], _INTERRUPTED)
+            interrupted = True
         finally:
-            for worker, stack in self.running.values():
-                worker.stop()
-                stack.close()
+            self.stopping.set()
+            threads.shutdown(cancel_futures=True)
+        for future, part in futures.items():
+            if not future.cancelled():
+                ends[part] = future.result()
+        return interrupted
 
-    def _start(self, part: Part) -> None:
-        with uninterrupted(), ExitStack() as stack:
-            workplace = stack.enter_context(self.store.workplace(part))
-            word = self.prints[part.entry.id]
-            worker = start(part, workplace, fingerprint=word, video=self.video)
-            self.running[part] = worker, stack.pop_all()
+    def _make(self, part: Part) -> Success | Failure:
+        """Make a part in a new process and keep its files."""
+        if self.stopping.is_set():
+            return _INTERRUPTED
+        # a fork would take over the callbacks, threads and OpenGL of this process
+        context = multiprocessing.get_context("spawn")
+        with self.store.workplace(part) as workplace:
+            reader, writer = context.Pipe(duplex=False)
+            arguments = (writer, part, workplace, self.hashes[part.entry.id], self.video)
+            process = context.Process(target=_work, args=arguments, name=part.name)
+            with reader:
+                try:
+                    with writer:
+                        process.start()
+                    end = self._listen(part, process, reader)
+                finally:
+                    _end(process)
+            if isinstance(end, Success):
+                self.store.keep(part, workplace)
+            self.shares[part] = 1.0
+            return end
 
-    def _listen(self) -> None:
-        """Wait for news of any part, and take in those that have come to an end."""
-        ready = wait([worker.connection for worker, _ in self.running.values()])
-        for part, (worker, stack) in list(self.running.items()):
-            if worker.connection not in ready:
-                continue
-            end = worker.listen()
-            if end is None:
-                continue
-            with uninterrupted(), stack:
-                if isinstance(end, Failure):
-                    self.outcome.missing[part] = end
-                else:
-                    self.store.keep(part, worker.workplace)
-                    self.outcome.ran.append(part.name)
-                    if end.problem:
-                        self.outcome.problems[part] = end.problem
-                worker.stop()
-                del self.running[part]
+    def _listen(self, part: Part, process: Any, reader: connection.Connection) -> Success | Failure:
+        """Take shares of the work from a process until it says how it ended."""
+        try:
+            while not self.stopping.is_set():
+                if not reader.poll(_INTERVAL):
+                    continue
+                message: Success | Failure | float = reader.recv()
+                if not isinstance(message, float):
+                    process.join(_PATIENCE)
+                    return message
+                self.shares[part] = message
+        except EOFError:
+            process.join(_PATIENCE)
+            return Failure(f"its process ended with {_named(process.exitcode)}")
+        return _INTERRUPTED
+
+
+def _end(process: Any) -> None:
+    """End a process, by force if it does not end by itself."""
+    if process.pid is None:  # it could not be started
+        return
+    process.terminate()
+    process.join(_PATIENCE)
+    process.kill()
+    process.join()
+    process.close()
+
+
+def _named(code: int | None) -> str:
+    if code is not None and code < 0:
+        return f"signal {signal.Signals(-code).name}"
+    return f"exit code {code}"
+
+
+def _work(
+    writer: connection.Connection, part: Part, workplace: Path, word: str, video: bool
+) -> None:
+    """Make a part in this process; send shares of the work, then how it ended."""
+    signal.signal(signal.SIGTERM, _leave)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent to answer
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    threading.Thread(target=_end_with, args=(parent, workplace), daemon=True).start()
+    last = 0.0
+
+    def progress(share: float) -> None:
+        nonlocal last
+        if time.monotonic() - last >= _INTERVAL:
+            writer.send(float(share))
+            last = time.monotonic()
+
+    end: Success | Failure
+    try:
+        try:
+            end = Success(make(part, workplace, fingerprint=word, video=video, progress=progress))
+        except BrokenPipeError:
+            raise
+        except Exception as error:
+            end = Failure(f"{type(error).__name__}: {error}", traceback.format_exc())
+        writer.send(end)
+    except BrokenPipeError:
+        sys.exit(1)  # the parent was killed
+    finally:
+        if not parent.is_alive():
+            shutil.rmtree(workplace, ignore_errors=True)
+
+
+def _end_with(parent: Any, workplace: Path) -> None:
+    """End this process, and remove what it has written, when its parent was killed."""
+    connection.wait([parent.sentinel])
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(_PATIENCE)
+    shutil.rmtree(workplace, ignore_errors=True)  # SIGTERM had no effect
+    os._exit(1)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    """Leave through every ``finally``, so that encoders are ended too."""
+    raise SystemExit(128 + number)

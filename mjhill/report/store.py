@@ -1,4 +1,4 @@
-"""The folder that keeps what each part gave: numbers, figure, video."""
+"""The folder with the files of each part: numbers, figure, video."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ NUMBERS, FIGURE, FILM = ".json", ".png", ".mp4"
 class Store:
     """A folder with up to three files for each part.
 
-    The file of numbers is written last: where it is, the others are whole.
+    The file of numbers is written last: if it exists, the others are complete.
     """
 
     folder: Path
 
     def open(self) -> None:
-        """Make the folder where it is not there, and remove what a killed run has left in it.
+        """Make the folder if needed, and remove what a killed run has left in it.
 
         Raises:
             OSError: It cannot be made or written.
@@ -41,12 +41,12 @@ class Store:
 
     @contextmanager
     def workplace(self, part: Part) -> Iterator[Path]:
-        """A hidden folder to make a part's files in, gone when this returns."""
+        """A hidden folder to write a part's files to; it is removed at the end."""
         with partial_folder(self.folder, part.name) as folder:
             yield folder
 
     def keep(self, part: Part, workplace: Path) -> None:
-        """Take over the files that a part made, in place of older ones."""
+        """Move the files of a part here; they replace older ones."""
         self.path(part, NUMBERS).unlink(missing_ok=True)
         for suffix in (FIGURE, FILM, NUMBERS):
             made = workplace / f"{part.name}{suffix}"
@@ -54,9 +54,9 @@ class Store:
                 os.replace(made, self.path(part, suffix))
 
     def read(self, part: Part, fingerprint: str) -> dict[str, Any] | None:
-        """The numbers of a part, None where they are missing, damaged, or made from other sources.
+        """The numbers of a part; None if they are missing, damaged, or made from other sources.
 
-        A film that is told of and lost is not told of any more.
+        If the numbers mention a film whose file is lost, they come without it.
         """
         try:
             numbers = json.loads(self.path(part, NUMBERS).read_text(encoding="utf-8"))
@@ -71,18 +71,18 @@ class Store:
 
 
 def is_finished(part: Part, numbers: dict[str, Any] | None, *, video: bool) -> bool:
-    """Whether a part has all that is wanted of it."""
+    """Whether a part has its numbers and, if it is to be filmed, its film."""
     if numbers is None:
         return False
     film = numbers["film"]
     if not (video and part.entry.filmed):
         return True
-    # an experiment that has nothing to film says so; a film that failed is tried again
+    # an experiment that has nothing to film says so; a failed film is tried again
     return film is not None and "problem" not in film
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write what can be read back by any reader of JSON.
+    """Write JSON that every reader of JSON can read.
 
     Raises:
         ValueError: A number is not finite.

@@ -1,4 +1,4 @@
-"""Random models with anything that is accepted: does one fail that no check has foretold?"""
+"""Random models with any accepted parameters: does a model fail without a warning of a check?"""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from typing import Any
 import mujoco
 
 from mjhill.benchmarks.fuzz.models import KINDS
-from mjhill.benchmarks.fuzz.trial import STEPS, STRONGEST, Outcome, run
+from mjhill.benchmarks.fuzz.outcomes import STEPS, STRONGEST, Outcome, run
 from mjhill.benchmarks.result import Result
 from mjhill.engine.install import installed
 
 COUNT = 100_000  # models in all
-SHOWN = 20  # silent failures that are named
+SHOWN = 20  # silent failures to list
 _CHUNK = 25
 
 Progress = Callable[[float], None]
@@ -31,13 +31,13 @@ def measure(
     case: str | None = None,
     progress: Progress | None = None,
 ) -> Result:
-    """How many random models fail, and how many of those without a finding.
+    """How many random models fail, and how many of these without a finding.
 
     Args:
-        kinds: Kinds of model; all without any.
+        kinds: Kinds of model; by default all.
         count: Models in all.
-        case: One model instead, such as ``hinge:17``: what was found and what came.
-        progress: Called now and then with the share done, 0 to 1.
+        case: One model instead, such as ``hinge:17``: its findings and its run.
+        progress: Called with the share done, from 0 to 1.
 
     Raises:
         ValueError: A kind or case is unknown.
@@ -59,9 +59,9 @@ def fuzz(
 
     Args:
         kinds: Kinds of model.
-        count: Models in all; each kind has the same number of them, to one.
-        processes: Processes at a time; by default one a core. With 1, all is done in this one.
-        progress: Called now and then with the share done, 0 to 1.
+        count: Models in all, divided evenly between the kinds.
+        processes: How many processes; by default one for each core. 1 means this process.
+        progress: Called with the share done, from 0 to 1.
 
     Raises:
         ValueError: A kind is unknown.
@@ -71,13 +71,13 @@ def fuzz(
             raise ValueError(f"unknown kind of model {kind!r}; there are: {', '.join(KINDS)}")
     jobs = [(kinds[k % len(kinds)], k // len(kinds)) for k in range(count)]
     outcomes: list[Outcome] = []
-    with installed():  # so that the machine code is in the cache before processes ask for it
+    with installed():  # compiles once, before the processes start
         if processes == 1:
             with quiet():
                 return [run(*job) for job in jobs]
     chunks = [jobs[first : first + _CHUNK] for first in range(0, count, _CHUNK)]
     with (
-        tempfile.TemporaryDirectory() as folder,  # MuJoCo writes a log where it runs
+        tempfile.TemporaryDirectory() as folder,  # MuJoCo writes a log to the working folder
         ProcessPoolExecutor(processes, initializer=os.chdir, initargs=(folder,)) as pool,
     ):
         for found in pool.map(_outcomes, chunks):
@@ -88,7 +88,7 @@ def fuzz(
 
 
 def replay(case: str) -> Outcome:
-    """Run one model again, by the name that an outcome has, such as ``hinge:17``.
+    """Run one model again, by its name, such as ``hinge:17``.
 
     Raises:
         ValueError: The name is not a kind and a number.
@@ -107,7 +107,7 @@ def _outcomes(jobs: list[tuple[str, int]]) -> list[Outcome]:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Without a line for each warning of MuJoCo, which are counted in the data."""
+    """Do not print the warnings of MuJoCo; the data count them."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: None)
     try:
@@ -117,7 +117,7 @@ def quiet() -> Iterator[None]:
 
 
 def table(outcomes: Sequence[Outcome]) -> Result:
-    """A row for each kind of model, and the silent failures with what replays them."""
+    """A row for each kind of model, and the silent failures with the command for each."""
     groups: dict[str, list[Outcome]] = {}
     for outcome in outcomes:
         groups.setdefault(outcome.kind, []).append(outcome)
@@ -135,9 +135,8 @@ def table(outcomes: Sequence[Outcome]) -> Result:
         f"{STEPS} steps each; a failure: a warning of MuJoCo, a state that is not finite, n or a "
         f"outside [0, 1], tension below 0 or above {STRONGEST:g} F_max; foretold: with a severe "
         "finding of check_model or check_tendons, or an error of a check",
-        "reported: by mjhill.record, which names what no muscle can do and refuses what MuJoCo "
-        f"warns of; it warned of {len(warned)} of them",
-        "plant: MuJoCo warns of the same run without muscles and elasticities of ours too",
+        f"reported: mjhill.record warns or raises; because MuJoCo warned: {len(warned)} of them",
+        "plant: MuJoCo also warns of the same run without mjhill's muscles and elasticities",
         "failures: " + ", ".join(f"{name} {n}" for name, n in kinds.most_common()),
         f"goal: none silent; there are {len(silent)}",
         *(f"{', '.join(o.failures)}: mjhill bench fuzz --case {o.case}" for o in silent[:SHOWN]),

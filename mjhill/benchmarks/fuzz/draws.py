@@ -11,12 +11,12 @@ from mjhill.joints.joint import Passive
 from mjhill.muscles.hill import Hill
 from mjhill.quantity import Quantity, quantities
 
-EDGE = 0.04  # chance that a parameter stands at one of its bounds
-SMALLEST = 1e-300  # drawn for a bound of 0 that is not itself allowed
+EDGE = 0.04  # probability that a parameter is one of its bounds
+SMALLEST = 1e-300  # in place of a bound of 0 that is not itself allowed
 
 Random = np.random.Generator
 
-# ordinary values, about which a tame parameter is drawn within a factor of three
+# ordinary values; a tame parameter is within a factor of three of them
 _ORDINARY = {
     "hill_shape": 0.25,
     "series_shape": 3.0,
@@ -30,12 +30,12 @@ _ORDINARY = {
 
 
 def log_uniform(random: Random, low: float, high: float) -> float:
-    """A positive number, its logarithm uniform."""
+    """A positive number whose logarithm is uniform."""
     return float(np.exp(random.uniform(math.log(low), math.log(high))))
 
 
 def chance(random: Random, share: float) -> bool:
-    """True in a share of all draws."""
+    """True with a probability."""
     return bool(random.random() < share)
 
 
@@ -45,7 +45,7 @@ def sign(random: Random) -> float:
 
 
 def anywhere(random: Random, quantity: Quantity) -> float:
-    """A value from the whole range of a parameter, now and then one of its bounds."""
+    """A value from the whole range of a parameter, sometimes one of its bounds."""
     low, high = quantity.low, quantity.high
     if chance(random, EDGE):
         least = low if quantity.low_allowed else low + (abs(low) * 1e-15 or SMALLEST)
@@ -58,13 +58,13 @@ def anywhere(random: Random, quantity: Quantity) -> float:
 
 
 def random_muscle(random: Random, force: float, length: float, wildness: float) -> Hill:
-    """A muscle of a size, with each parameter drawn from its whole range at a chance.
+    """A muscle of a size; each parameter may, with a probability, be anywhere in its range.
 
     Args:
-        random: Where the numbers come from.
-        force: Maximum isometric force of a tame muscle, about [N·m or N].
-        length: Length over which a tame muscle works, about [rad or m].
-        wildness: Chance of each parameter to be anywhere in its range.
+        random: Source of the random numbers.
+        force: Typical maximum isometric force of a tame muscle [N·m or N].
+        length: Typical length over which a tame muscle works [rad or m].
+        wildness: Probability that a parameter may be anywhere in its range.
     """
     values: dict[str, Any] = {}
     for name, quantity in quantities(Hill):
@@ -99,7 +99,7 @@ def _tame(random: Random, name: str, quantity: Quantity, force: float, length: f
 
 
 def random_passive(random: Random, torque: float, length: float, wildness: float) -> Passive:
-    """A passive elasticity of a size, with each parameter anywhere in its range at a chance."""
+    """A passive elasticity of a size; each parameter may be anywhere in its range."""
     tame = {
         "k1_pos": torque * log_uniform(random, 1e-3, 0.3),
         "k2_pos": log_uniform(random, 0.5, 8) / length,

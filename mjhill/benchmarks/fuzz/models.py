@@ -30,18 +30,18 @@ TIMESTEPS = (0.1e-3, 10e-3)  # [s], shortest and longest
 
 @dataclass
 class Draft:
-    """A model under construction, and the sizes that its parts are drawn about.
+    """A model under construction, and the typical sizes of its parts.
 
     Attributes:
-        random: Where the numbers come from.
+        random: Source of the random numbers.
         spec: The model.
         timestep: [s].
-        wildness: Chance of each parameter to be anywhere in its range.
-        force: Force of a muscle, about [N·m or N].
-        length: Length over which a muscle works, about [rad or m].
+        wildness: Probability that a parameter may be anywhere in its range.
+        force: Typical force of a muscle [N·m or N].
+        length: Typical length over which a muscle works [rad or m].
         joints: Names of the joints with one coordinate.
-        reach: How far the joints move, about [rad or m].
-        inertia: That of the body before [kg·m² or kg].
+        reach: Typical movement of the joints [rad or m].
+        inertia: Inertia of the previous body [kg·m² or kg].
         slopes: Stiffness [N·m/rad or N/m] of muscles drawn so far, in units of gear².
     """
 
@@ -58,7 +58,7 @@ class Draft:
 
 
 def random_model(kind: str, random: Random) -> tuple[mujoco.MjModel, float]:
-    """A model of a kind, one of ``KINDS``, and how far its joints move, about [rad or m]."""
+    """A model of a kind, one of ``KINDS``, and how far its joints move, roughly [rad or m]."""
     spec = mujoco.MjSpec()
     spec.modelname = kind
     spec.compiler.degree = False
@@ -103,13 +103,12 @@ def _exchange(spec: mujoco.MjSpec, name: str) -> None:
 
 
 def _joint_muscles(draft: Draft) -> None:
-    """One joint with one to four muscles, geared to either side."""
+    """One joint with one to four muscles on either side."""
     slide = draft.spec.modelname == "slide"
     parts = [(_gear(draft), _muscle(draft)) for _ in range(int(draft.random.integers(1, 5)))]
     for gear, part in parts:
         draft.slopes.append(gear * gear * stiffness(part))
-    body = _body(draft, draft.spec.worldbody, slide)
-    del body
+    _body(draft, draft.spec.worldbody, slide)
     for index, (gear, part) in enumerate(parts):
         add_muscle(draft.spec, name=f"m{index}", muscle=part, joint=draft.joints[0], gear=gear)
 
@@ -146,7 +145,7 @@ def _chain(draft: Draft) -> None:
 
 
 def _equality(draft: Draft) -> None:
-    """A chain with equality constraints: joints, tendons, points or bodies held together."""
+    """A chain with equality constraints between joints, tendons, points or bodies."""
     _chain(draft)
     random, spec = draft.random, draft.spec
     for index in range(int(random.integers(1, 3))):
@@ -198,7 +197,7 @@ def _spatial(draft: Draft) -> None:
     for _ in range(int(random.integers(1, 4))):
         body = _body(draft, segments[-1], chance(random, 0.1))
         body.pos = [0, 0, 0 if len(segments) == 1 else -reach]
-        if chance(random, 0.6):  # as limbs have, within which a path may stay on its surfaces
+        if chance(random, 0.6):  # as limbs have; a path may stay on its surfaces within it
             joint = body.first_joint()
             joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
             joint.range = [-float(random.uniform(0.1, 1)), float(random.uniform(0.1, 1))]
@@ -214,7 +213,7 @@ def _spatial(draft: Draft) -> None:
 def _path(
     draft: Draft, name: str, segments: list[Any], radius: float, reach: float, side: float
 ) -> None:
-    """A tendon from the first to the last of some segments, over what it meets."""
+    """A tendon from the first to the last of some segments, wrapped around geoms between."""
     random, spec = draft.random, draft.spec
     tendon = spec.add_tendon(name=name)
     for order, body in enumerate(segments):
@@ -255,7 +254,7 @@ def _gear(draft: Draft) -> float:
 
 
 def _body(draft: Draft, parent: Any, slide: bool) -> Any:
-    """A body on a joint, of an inertia that suits the muscles' stiffness or of any other."""
+    """A body on a joint; its inertia usually suits the stiffness of the muscles."""
     random = draft.random
     index = len(draft.joints)
     name = f"joint{index}"

@@ -1,4 +1,4 @@
-"""Random systems through MuJoCo and through the reference: how far off, and was it foretold."""
+"""Random systems in MuJoCo and in the reference solver: errors, and warnings of the check."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from mjhill.benchmarks.result import Result
 from mjhill.benchmarks.sweep.cases import DURATION, KINDS, Case, draw
-from mjhill.benchmarks.sweep.trial import PUSH, Truth, error, floor, run, solve, stretched, use
+from mjhill.benchmarks.sweep.solutions import PUSH, Truth, error, floor, run, solve, stretched, use
 from mjhill.engine.checks import check_model
 from mjhill.engine.install import installed
 
@@ -21,13 +21,13 @@ TIMESTEPS = (0.5e-3, 1e-3, 2e-3, 5e-3)  # [s]
 INTEGRATORS = ("implicitfast", "euler", "discrete", "RK4")
 COUNT = 100  # systems of each kind
 SENSITIVE = 10.0  # times that a push may grow
-MISSED = 5.0  # error [%] that a finding must foretell
-FLOOR = 1.5  # times what MuJoCo's own step of the plant is off, where that is more
+MISSED = 5.0  # error [%] from which a finding is required
+FLOOR = 1.5  # times the error of MuJoCo's own plant, if that is larger
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one system came out under one integrator and timestep.
+    """The error of one system under one integrator and timestep.
 
     Attributes:
         case: Kind and number, as ``physiological:17``.
@@ -35,9 +35,9 @@ class Outcome:
         integrator: Its name in MJCF.
         timestep: [s].
         error: Largest error [% of the range of angle; of F_max where the movement is prescribed].
-        floor: The same of the plant alone, driven by the true torques; None where not measured.
+        floor: The error of the plant alone, driven by the true torques; None if not measured.
         amplification: How much a small push grows.
-        finding: What ``check_model`` says, the first finding; empty without any.
+        finding: The first finding of ``check_model``; empty if there is none.
         severe: Whether that finding is severe.
     """
 
@@ -61,10 +61,10 @@ def measure(
     """The table of errors of random systems by kind, integrator and timestep.
 
     Args:
-        kinds: Kinds of system; all without any.
+        kinds: Kinds of system; by default all.
         count: Systems of each kind.
         case: One system instead, such as ``physiological:17``: a row for each run.
-        progress: Called now and then with the share done, 0 to 1.
+        progress: Called with the share done, from 0 to 1.
 
     Raises:
         ValueError: A kind or case is unknown.
@@ -90,8 +90,8 @@ def sweep(
         count: Systems of each kind, numbered from 0.
         integrators: Integrators by their names in MJCF.
         timesteps: Timesteps [s].
-        processes: Processes at a time; by default one a core. With 1, all is done in this one.
-        progress: Called now and then with the share done, 0 to 1.
+        processes: How many processes; by default one for each core. 1 means this process.
+        progress: Called with the share done, from 0 to 1.
 
     Raises:
         ValueError: A kind is unknown.
@@ -102,7 +102,7 @@ def sweep(
         for number in range(count)
     ]
     outcomes: list[Outcome] = []
-    with installed():  # so that the machine code is in the cache before processes ask for it
+    with installed():  # compiles once, before the processes start
         if processes == 1:
             for done, job in enumerate(jobs):
                 outcomes += _outcomes(job)
@@ -118,7 +118,7 @@ def sweep(
 def replay(
     case: str, integrators: Sequence[str] = INTEGRATORS, timesteps: Sequence[float] = TIMESTEPS
 ) -> list[Outcome]:
-    """Run one system again, by the name that an outcome has, such as ``physiological:17``.
+    """Run one system again, by its name, such as ``physiological:17``.
 
     Raises:
         ValueError: The name is not a kind and a number.
@@ -143,15 +143,15 @@ def _outcomes(job: tuple[str, int, tuple[str, ...], tuple[float, ...]]) -> list[
             _outcome(truth, integrator, timestep)
             for integrator in integrators
             for timestep in timesteps
-            # a stage of RK4 has a position of its own, which no one can prescribe
+            # the positions within a step of RK4 cannot be prescribed
             if not (truth.case.movement and integrator == "RK4")
         ]
 
 
 def _outcome(truth: Truth, integrator: str, timestep: float) -> Outcome:
     case = truth.case
-    # no joint is too fast for a timestep where its movement is prescribed
-    finding, severe = ("", False) if case.movement else _foretold(case, integrator, timestep)
+    # a joint whose movement is prescribed is never too fast for a timestep
+    finding, severe = ("", False) if case.movement else _gravest_finding(case, integrator, timestep)
     advance = stretched if case.movement else run
     return Outcome(
         case.name,
@@ -166,8 +166,8 @@ def _outcome(truth: Truth, integrator: str, timestep: float) -> Outcome:
     )
 
 
-def _foretold(case: Case, integrator: str, timestep: float) -> tuple[str, bool]:
-    """The gravest finding of ``check_model``, and whether it is severe."""
+def _gravest_finding(case: Case, integrator: str, timestep: float) -> tuple[str, bool]:
+    """The most severe finding of ``check_model``, and whether it is severe."""
     use(case.model, integrator, timestep)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
@@ -176,7 +176,7 @@ def _foretold(case: Case, integrator: str, timestep: float) -> tuple[str, bool]:
 
 
 def table(outcomes: Sequence[Outcome]) -> Result:
-    """A row for each kind and integrator, and the worst cases with what replays them."""
+    """A row for each kind and integrator, and the worst cases with the command for each."""
     rows: list[dict[str, Any]] = []
     groups = dict.fromkeys((o.kind, o.integrator) for o in outcomes)
     worst: list[str] = []
@@ -212,7 +212,7 @@ def table(outcomes: Sequence[Outcome]) -> Result:
 
 
 def is_missed(outcome: Outcome) -> bool:
-    """Whether a free movement is more than 5 % off with no finding that foretold it."""
+    """Whether the error of a free movement is above 5 % although there is no finding."""
     if outcome.floor is None or outcome.amplification > SENSITIVE or outcome.finding:
         return False
     return outcome.error > max(MISSED, FLOOR * outcome.floor)
@@ -231,6 +231,6 @@ def _cells(outcomes: list[Outcome], timestep: float) -> dict[str, str | int]:
 
 
 def _spread(errors: list[float]) -> str:
-    """Median, 99 % and most."""
+    """Median, 99 % quantile and largest."""
     shares = (0.5, 0.99, 1.0)
     return " / ".join(f"{np.quantile(errors, share, method='higher'):.2g}" for share in shares)

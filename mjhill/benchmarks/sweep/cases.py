@@ -1,4 +1,4 @@
-"""Random systems and inputs, each drawn from the name of its kind and its number alone."""
+"""Random systems and inputs; the kind and the number of a case determine all of it."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ class Case:
 
     Attributes:
         kind: Kind of system, one of ``KINDS``.
-        number: Number within the kind; kind and number say all.
+        number: Number within the kind; both together determine the case.
         model: The system in MuJoCo.
         system: The system for the reference solver; None for spatial tendons.
-        excitation: Neural input by muscle.
-        torque: External torque by joint.
-        start: Position by joint, at rest, the muscles steady at ``tonic``.
-        tonic: Input of each muscle before the start.
-        movement: Movement of the joints that are prescribed.
+        excitation: Excitation of each muscle.
+        torque: External torque of each joint.
+        start: Position of each joint, at rest, with muscles in steady state at ``tonic``.
+        tonic: Excitation of each muscle before the start.
+        movement: Prescribed movement of joints.
     """
 
     kind: str
@@ -54,7 +54,7 @@ class Case:
 
     @property
     def name(self) -> str:
-        """What the case is called: kind and number."""
+        """Kind and number."""
         return f"{self.kind}:{self.number}"
 
 
@@ -73,7 +73,7 @@ def draw(kind: str, number: int) -> Case:
 
 
 def _physiological(kind: str, number: int, random: _Random) -> Case:
-    """A joint of the paper, each parameter moved within what people and muscles show."""
+    """A joint of the paper, each parameter varied within physiological ranges."""
     joint = _varied_joint(random)
     return _driven(kind, number, random, System.of(joint), joint.range)
 
@@ -256,17 +256,17 @@ def _tonic(random: _Random) -> float:
 
 
 def _excitation(random: _Random, tonic: float) -> Signal:
-    """An input that leaves its tonic level: a step, pulses, or a sinusoid."""
+    """An excitation that leaves its tonic value: a step, pulses, or a sinusoid."""
     onset = _on_grid(random, 0.0, 0.2)
-    level = float(random.choice([0.0, 1.0, random.uniform(0, 1)]))
+    target = float(random.choice([0.0, 1.0, random.uniform(0, 1)]))
     forms = {"hold": 0.1, "step": 0.3, "pulse": 0.25, "pulses": 0.2, "sinusoid": 0.15}
     form = random.choice(list(forms), p=list(forms.values()))
     if form == "hold":
         return as_signal(tonic)
     if form == "step":
-        return as_signal(tonic) + pulse(level - tonic, onset, 10.0)
+        return as_signal(tonic) + pulse(target - tonic, onset, 10.0)
     if form == "pulse":
-        return as_signal(tonic) + pulse(level - tonic, onset, _on_grid(random, 0.02, 0.3))
+        return as_signal(tonic) + pulse(target - tonic, onset, _on_grid(random, 0.02, 0.3))
     if form == "pulses":
         total = as_signal(tonic)
         for _ in range(int(random.integers(2, 5))):
@@ -274,7 +274,7 @@ def _excitation(random: _Random, tonic: float) -> Signal:
             total = total + pulse(float(random.uniform(0, 1)) - tonic, onset, width)
             onset = round(onset + width + _on_grid(random, 0.01, 0.1), 6)
         return total
-    return sinusoid(0.5 * level, _log(random, 0.5, 6)) + 0.5 * level
+    return sinusoid(0.5 * target, _log(random, 0.5, 6)) + 0.5 * target
 
 
 def _push(random: _Random, force: float) -> Signal:
@@ -318,7 +318,7 @@ def _varied_muscle(random: _Random, muscle: Hill) -> Hill:
 
 
 def _linear_muscle(random: _Random, optimal: float, force: float) -> Hill:
-    """A muscle in metres and newtons, of fibres of an optimal length [m] and about a force [N]."""
+    """A muscle in metres and newtons, from an optimal fibre length [m] and a typical force [N]."""
     return Hill(
         max_isometric_force=force * _log(random, 0.5, 2),
         optimal_length=optimal * float(random.uniform(-0.2, 0.2)),

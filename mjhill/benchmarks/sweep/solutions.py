@@ -1,4 +1,4 @@
-"""One case solved by the reference and by MuJoCo at several timesteps, and how far they differ."""
+"""One case solved by the reference solver and by MuJoCo, and the difference between the two."""
 
 from __future__ import annotations
 
@@ -20,10 +20,12 @@ from mjhill.simulate.signals import Signal, as_signal
 
 SAMPLE = 0.5e-3  # [s], divides every timestep of the sweep
 FINE = 50e-6  # [s], RK4's timestep where the reference solver cannot follow
-PUSH = 1e-3  # share of the range of angle and of F_max by which a sensitive system is found
+PUSH = 1e-3  # share of the range of angle and of F_max; its growth shows a sensitive system
 _PUSHED_FINE = 200e-6  # [s], coarser: two pushed runs are compared with one another
-_RTOL, _ATOL = 1e-7, 1e-9  # of the reference, a thousandth of the errors looked for
-_PUSHED_LOOSER = 100  # times: a hundredth of the push is near enough to tell how much it grows
+_RTOL, _ATOL = 1e-7, 1e-9  # of the reference, a thousandth of the errors to find
+_PUSHED_LOOSER = (
+    100  # times: an error of a hundredth of the push still shows how much the push grows
+)
 
 _Values = NDArray[np.float64]
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -53,7 +55,7 @@ class Truth:
 
 
 def solve(case: Case) -> Truth:
-    """Solve a case as exactly as is possible, and find how much it amplifies a push."""
+    """Solve a case as exactly as possible, and find how much it amplifies a push."""
     if case.movement:
         recording = _reference(case)
         return Truth(case, _positions(case, recording), _forces(case, recording), 0.0)
@@ -74,11 +76,11 @@ def solve(case: Case) -> Truth:
 
 
 def _pushed(case: Case, positions: _Values) -> list[Case]:
-    """The case from a start moved by a share of the range, and with a push added."""
+    """Two cases: one starts a share of the range away, the other gets a push."""
     [first, *_] = case.start
     moved = {**case.start, first: case.start[first] + PUSH * float(np.ptp(positions, axis=0).max())}
     largest = _largest_force(case)
-    if case.system is None:  # force of a tendon to torque of a hinge
+    if case.system is None:  # from the force of a tendon to the torque of a hinge
         data = mujoco.MjData(case.model)
         mujoco.mj_fwdPosition(case.model, data)
         largest *= float(np.abs(data.actuator_moment).max())
@@ -129,8 +131,8 @@ def use(model: mujoco.MjModel, integrator: str, timestep: float) -> None:
 def run(case: Case, integrator: str, timestep: float, every: int | None = None) -> _Values:
     """Positions at multiples of ``SAMPLE`` or of the timestep, whichever is longer.
 
-    Or at each ``every``-th step. Shape (T, nq). Callbacks must be installed. From where MuJoCo
-    warns, positions are NaN.
+    Or at each ``every``-th step. Shape (T, nq). Callbacks must be installed. After a warning of
+    MuJoCo positions are NaN.
     """
     use(case.model, integrator, timestep)
     positions, _ = _rollout(case.model, at_start(case), inputs_of(case, timestep))
@@ -153,7 +155,7 @@ def _largest_force(case: Case) -> float:
 
 
 def floor(truth: Truth, integrator: str, timestep: float) -> _Values:
-    """As ``run``, with motors for muscles that give the true tensions."""
+    """As ``run``, but motors with the true tensions replace the muscles."""
     case = truth.case
     model = copy(case.model)
     use(model, integrator, timestep)
@@ -175,7 +177,7 @@ def floor(truth: Truth, integrator: str, timestep: float) -> _Values:
 def stretched(case: Case, integrator: str, timestep: float) -> _Values:
     """Tension of the muscles of a case whose joint is moved, at every step, shape (T, nmuscle).
 
-    Velocity is what it is in MuJoCo's own movements: the mean one of the step before.
+    Velocity is, as in MuJoCo's own movements, the mean of the step before.
     """
     use(case.model, integrator, timestep)
     data = at_start(case)
@@ -207,7 +209,7 @@ def at_start(case: Case) -> mujoco.MjData:
 
 
 def inputs_of(case: Case, timestep: float) -> _Values:
-    """Controls and applied forces of each step, their values of mid-step."""
+    """Controls and applied forces of each step: the values in the middle of the step."""
     model = case.model
     times = (np.arange(round(DURATION / timestep)) + 0.5) * timestep
     inputs = np.zeros((len(times), model.nu + model.nv))
@@ -225,7 +227,7 @@ def _sampled(signal: Signal, times: NDArray[Any]) -> list[float]:
 def _rollout(
     model: mujoco.MjModel, data: mujoco.MjData, inputs: _Values
 ) -> tuple[_Values, _Values]:
-    """Positions at the start and after each step, and what sensors read in each step."""
+    """Positions at the start and after each step, and the readings of the sensors."""
     start = np.empty(mujoco.mj_stateSize(model, _FULL))
     mujoco.mj_getState(model, data, start, _FULL)
     states, sensed = mujoco.rollout.rollout(

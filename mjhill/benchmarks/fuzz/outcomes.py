@@ -1,4 +1,4 @@
-"""One random model, what the checks say about it, and what a run of it does."""
+"""One random model: the findings of the checks, and the failures of a run."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from mjhill.simulate.run import record
 from mjhill.simulate.signals import Signal
 
 STEPS = 400
-HOLD = 20  # steps between changes of the controls
-STRONGEST = 3.0  # tension that no muscle has [F_max]
+HOLD = 20  # steps between two changes of the controls
+STRONGEST = 3.0  # more tension than any muscle has [F_max]
 ROUNDING = 1e-9  # n and a may be outside [0, 1] by so much
 
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -33,16 +33,15 @@ _Values = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Case:
-    """A model, the data that it starts from, and the controls of each step.
+    """A model, its data at the start, and the controls of each step.
 
     Attributes:
         kind: Kind of model, one of ``KINDS``.
-        number: Number within the kind; kind and number say all.
+        number: Number within the kind; both together determine the case.
         model: The model.
-        data: Where it starts.
-        controls: Shape (STEPS, nu); values that are no control among them.
+        data: Its state at the start.
+        controls: Shape (STEPS, nu); some values are not valid controls.
         start: How the start was made.
-        equilibrated: Whether the muscles start steady.
     """
 
     kind: str
@@ -54,24 +53,24 @@ class Case:
 
     @property
     def name(self) -> str:
-        """What the case is called: kind and number."""
+        """Kind and number."""
         return f"{self.kind}:{self.number}"
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the checks foretold of one model, and what came.
+    """What the checks say of one model, and what its run does.
 
     Attributes:
         case: Kind and number, as ``hinge:17``.
         integrator: Its name in MuJoCo.
         timestep: [s].
         start: How the start was made.
-        failures: What a muscle cannot do and the run did; empty where all was well.
+        failures: What the run did although no muscle can; empty if all was well.
         findings: Severe findings, and errors of the checks.
         hints: Findings that are not severe.
-        plant: Whether MuJoCo warns of the same run without muscles and elasticities of ours.
-        reported: What ``mjhill.record`` says of the same run, where nothing was foretold.
+        plant: Whether MuJoCo warns of the same run without mjhill's muscles and elasticities.
+        reported: What ``mjhill.record`` says of the same run, if the checks found nothing.
     """
 
     case: str
@@ -81,7 +80,6 @@ class Outcome:
     failures: tuple[str, ...]
     findings: tuple[str, ...]
     hints: tuple[str, ...]
-
     plant: bool
     reported: str
 
@@ -92,7 +90,7 @@ class Outcome:
 
     @property
     def verdict(self) -> str:
-        """In a word: sound, foretold, finding only (and no failure), plant, reported or silent."""
+        """One of: sound, foretold, finding only (no failure), plant, reported, silent."""
         if not self.failures:
             return "finding only" if self.findings else "sound"
         if self.findings:
@@ -127,14 +125,14 @@ def draw(kind: str, number: int) -> Case:
     else:
         start += " unsteady"
     if start == "act":
-        _far_off(random, model, data)
+        _impossible_states(random, model, data)
     return Case(kind, number, model, data, controls, start)
 
 
 def run(kind: str, number: int) -> Outcome:
     """Check a case, then run it. Callbacks must be installed."""
     case = draw(kind, number)
-    findings, hints = _foretold(case)
+    findings, hints = _findings(case)
     failures = _failures(case)
     if failures and not findings:  # last, because it takes longer than the run
         findings = tuple(str(finding) for finding in check_tendons(case.model))
@@ -150,7 +148,7 @@ def run(kind: str, number: int) -> Outcome:
 def _pose(
     random: Random, model: mujoco.MjModel, data: mujoco.MjData, reach: float, far: bool
 ) -> None:
-    """Scalar joints within a reach [rad or m], or far outside of it; some in motion."""
+    """Move hinges and slides within a reach [rad or m], or far outside of it; some also move."""
     for joint in range(model.njnt):
         if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_BALL:
             continue
@@ -163,7 +161,7 @@ def _pose(
 
 
 def _hold_equalities(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Where something is held together that the pose has torn apart, back to ``qpos0``, still."""
+    """Back to ``qpos0``, at rest, if the pose violates an equality constraint."""
     mujoco.mj_fwdPosition(model, data)
     if data.ne and np.abs(data.efc_pos[: data.ne]).max() > 1e-6:
         data.qpos[:] = model.qpos0
@@ -171,34 +169,36 @@ def _hold_equalities(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 def _equilibrate(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Steady muscles at the controls that can be held."""
+    """Muscles in steady state at the controls; 0 replaces a control that is not finite."""
     held = data.ctrl.copy()
     data.ctrl[:] = np.where(np.isfinite(held), held, 0.0)
     equilibrate(model, data)
     data.ctrl[:] = held
 
 
-def _far_off(random: Random, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """One to three states where a muscle's never are."""
+def _impossible_states(random: Random, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Set one to three states to values that a muscle never has."""
     values = [-0.5, -1e-3, 1.01, 2.0, 1e3, -1e10, 1e10, 1e300, -1e300, math.inf, math.nan, 0.5]
     for _ in range(int(random.integers(1, 4))):
         data.act[int(random.integers(model.na))] = float(random.choice(values))
 
 
 def _controls(random: Random, model: mujoco.MjModel) -> _Values:
-    """Inputs that jump now and then; in one case of four, some that are no input."""
+    """Excitations that jump every ``HOLD`` steps; in one case of four, some are not valid."""
     spans = STEPS // HOLD
-    levels = random.choice([0.0, 1.0, np.nan], size=(spans, model.nu), p=[0.3, 0.3, 0.4])
-    levels = np.where(np.isnan(levels), random.uniform(0, 1, levels.shape), levels)
+    excitations = random.choice([0.0, 1.0, np.nan], size=(spans, model.nu), p=[0.3, 0.3, 0.4])
+    drawn = random.uniform(0, 1, excitations.shape)
+    excitations = np.where(np.isnan(excitations), drawn, excitations)
     if chance(random, 0.25):
         wrong = [math.nan, math.inf, -math.inf, -1.0, 1.5, 1e6, -1e6, 1e12]
-        where = random.random(levels.shape) < 0.15
-        levels = np.where(where, random.choice(wrong, size=levels.shape), levels)
-    return np.repeat(levels, HOLD, axis=0)
+        where = random.random(excitations.shape) < 0.15
+        chosen = random.choice(wrong, size=excitations.shape)
+        excitations = np.where(where, chosen, excitations)
+    return np.repeat(excitations, HOLD, axis=0)
 
 
-def _foretold(case: Case) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Severe findings and errors of the checks; and findings that are not severe."""
+def _findings(case: Case) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Errors and severe findings of the checks; then the findings that are not severe."""
     found: list[Finding] = []
     errors: list[str] = []
     with warnings.catch_warnings():
@@ -222,15 +222,15 @@ def _copy(case: Case) -> mujoco.MjData:
 
 
 def _failures(case: Case) -> tuple[str, ...]:
-    """What a run of a case shows that no muscle does."""
+    """What a run of a case does although no muscle can."""
     model, data = case.model, _copy(case)
     start = np.empty(mujoco.mj_stateSize(model, _FULL))
     mujoco.mj_getState(model, data, start, _FULL)
     states, sensed = mujoco.rollout.rollout(model, data, start[None], case.controls[None])
     counts = data.warning.number.copy()
     if not (np.abs(case.controls) <= mujoco.mjMAXVAL).all():
-        counts[int(mujoco.mjtWarning.mjWARN_BADCTRL)] = 0  # MuJoCo is right to warn
-    # past act is the history of delays, which holds controls as they were given
+        counts[int(mujoco.mjtWarning.mjWARN_BADCTRL)] = 0  # MuJoCo warns rightly
+    # after act comes the history of delays, which holds unclamped controls
     physics = states[0][:, : 1 + model.nq + model.nv + model.na]
     return impossible(model, physics, -np.asarray(sensed[0]), counts)
 
@@ -238,7 +238,7 @@ def _failures(case: Case) -> tuple[str, ...]:
 def impossible(
     model: mujoco.MjModel, states: _Values, tension: _Values, warned: NDArray[np.int32]
 ) -> tuple[str, ...]:
-    """What a run shows that no muscle does.
+    """What a run does although no muscle can.
 
     Args:
         model: A model whose actuators are all muscles.
@@ -267,7 +267,7 @@ def impossible(
 
 
 def _plant_warns(case: Case) -> bool:
-    """Whether MuJoCo warns of the same run without muscles and elasticities of ours."""
+    """Whether MuJoCo warns of the same run without mjhill's muscles and elasticities."""
     model, data = copy(case.model), _copy(case)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     if model.nuser_jnt:
@@ -277,9 +277,9 @@ def _plant_warns(case: Case) -> bool:
 
 
 def _reported(case: Case) -> str:
-    """What ``record`` says of a run; empty if nothing."""
+    """What ``record`` warns of or raises in a run; empty if nothing."""
     model, timestep = case.model, float(case.model.opt.timestep)
-    inputs = _taken(model, case.controls)
+    inputs = _clamped(model, case.controls)
     excitation = {name: _held(inputs[:, at.ctrl], timestep) for name, at in addresses(model)}
     data = _copy(case)
     data.ctrl[:] = inputs[0]
@@ -290,13 +290,13 @@ def _reported(case: Case) -> str:
             record(model, data, excitation=excitation, duration=STEPS * timestep)
         except (RuntimeError, RuntimeWarning) as said:
             return str(said)
-        except ValueError:  # refused for its inputs, which says nothing of the failure
+        except ValueError:  # refused because of its inputs, not of the failure
             return ""
     return ""
 
 
-def _taken(model: mujoco.MjModel, controls: _Values) -> _Values:
-    """Controls as MuJoCo takes them: clamped, then 0 for all where one is still none."""
+def _clamped(model: mujoco.MjModel, controls: _Values) -> _Values:
+    """Controls as MuJoCo uses them: clamped, then 0 for all if one is still not valid."""
     if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL:
         limited = model.actuator_ctrllimited.astype(bool)
         clamped = np.clip(controls, *model.actuator_ctrlrange.T)  # NaN stays NaN
@@ -305,6 +305,6 @@ def _taken(model: mujoco.MjModel, controls: _Values) -> _Values:
     return np.where(good[:, None], controls, 0.0)
 
 
-def _held(levels: _Values, timestep: float) -> Signal:
-    """Levels, each held for a timestep [s]."""
-    return Signal(lambda time: float(levels[min(int(time / timestep), len(levels) - 1)]))
+def _held(values: _Values, timestep: float) -> Signal:
+    """A signal that holds each value for a timestep [s]."""
+    return Signal(lambda time: float(values[min(int(time / timestep), len(values) - 1)]))
