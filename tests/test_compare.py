@@ -7,6 +7,7 @@ import math
 import mujoco
 import numpy as np
 import pytest
+from test_render import frames_of
 
 import mjhill
 from mjhill.analysis import responses
@@ -14,6 +15,7 @@ from mjhill.comparison import Comparison, compare, step_cost, write
 from mjhill.comparison import table as trials
 from mjhill.comparison.cost import bare_spec
 from mjhill.comparison.native import read_spec
+from mjhill.comparison.report import views_of
 
 TIME = np.linspace(0.0, 2.0, 2001)
 
@@ -106,7 +108,7 @@ def test_the_table_is_complete_and_finite(comparison: Comparison) -> None:
             assert math.isfinite(value), row
 
 
-def test_both_models_start_alike_and_the_joint_is_at_rest_until_it_is_hit(
+def test_both_models_start_alike_and_the_joint_is_at_rest_until_the_impulse(
     comparison: Comparison,
 ) -> None:
     for sides in comparison.recordings.values():
@@ -152,13 +154,13 @@ def test_a_table_holds_in_json(comparison: Comparison) -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"level": 0.0}, r"level must be in \(0, 1\], got 0.0"),
-        ({"levels": (0.1, 1.5)}, r"levels must be in \(0, 1\], got 1.5"),
-        ({"levels": (0.1, 0.1)}, "two different"),
-        ({"hit": math.nan}, "hit must be positive and finite"),
+        ({"excitation": 0.0}, r"excitation must be in \(0, 1\], got 0.0"),
+        ({"co_contractions": (0.1, 1.5)}, r"co_contractions must be in \(0, 1\], got 1.5"),
+        ({"co_contractions": (0.1, 0.1)}, "two different"),
+        ({"impulse": math.nan}, "impulse must be positive and finite"),
     ],
 )
-def test_inputs_out_of_range_are_refused(wrong: dict, message: str) -> None:
+def test_arguments_out_of_range_are_refused(wrong: dict, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         compare("elbow", **wrong)
 
@@ -213,21 +215,52 @@ def test_all_files_are_written_whole(comparison: Comparison, tmp_path) -> None:
     assert json.loads((folder / "comparison.json").read_text())["model"] == "elbow"
 
 
-def test_the_video_shows_both_models_side_by_side(
-    comparison: Comparison, tmp_path, monkeypatch
+def test_a_folder_that_cannot_be_written_is_an_error_and_stays_as_it_is(
+    comparison: Comparison, tmp_path
 ) -> None:
-    calls, shares = [], []
+    taken = tmp_path / "taken"
+    taken.write_text("mine")
+    for folder in (taken, taken / "deeper"):
+        with pytest.raises(OSError, match="taken"):
+            write(comparison, folder)
+    assert taken.read_text() == "mine"
+    film = tmp_path / "film"
+    (film / "comparison.mp4").mkdir(parents=True)
+    with pytest.raises(OSError, match=r"comparison\.mp4"):
+        write(comparison, film)
+    assert (film / "comparison.mp4").is_dir()
 
-    def render(views, path, *, speed, progress) -> None:
-        calls.append((views, path, speed))
-        progress(1, 2)
 
-    monkeypatch.setattr("mjhill.draw.render", render)
-    paths = write(comparison, tmp_path, progress=shares.append)
-    views, path, speed = calls[0]
-    assert path == paths[-1] == tmp_path / "comparison.mp4"
+def test_the_video_shows_both_models_side_by_side(comparison: Comparison, tmp_path) -> None:
+    views = views_of(comparison)
     assert [(view.model.na, view.title) for view in views] == [
         (6, "mjhill"),
         (2, "MuJoCo <muscle>"),
     ]
-    assert (speed, shares) == (0.25, [0.5])
+    for view, recording in zip(views, comparison.recordings["pulses"].values(), strict=True):
+        assert view.recording is recording
+
+
+def test_the_video_is_rendered_at_a_quarter_of_the_speed(comparison: Comparison, tmp_path) -> None:
+    def cut(run: mjhill.Recording) -> mjhill.Recording:
+        first = slice(0, 101)
+        series = {name: values[first] for name, values in run.series.items()}
+        return dataclasses.replace(run, time=run.time[first], series=series)
+
+    short = {
+        task: {side: cut(run) for side, run in sides.items()}
+        for task, sides in comparison.recordings.items()
+    }
+    shares: list[float] = []
+    paths = write(
+        dataclasses.replace(comparison, recordings=short), tmp_path, progress=shares.append
+    )
+    assert paths[-1] == tmp_path / "comparison.mp4"
+    duration = short["pulses"]["mjhill"].time[-1]
+    frames = frames_of(paths[-1])
+    assert len(frames) == pytest.approx(30 * duration / 0.25, abs=1)
+    left, right = np.split(frames[-1].astype(float), 2, axis=1)
+    assert left.std() > 1
+    assert right.std() > 1
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0

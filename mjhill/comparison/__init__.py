@@ -1,4 +1,4 @@
-"""MuJoCo's own muscle in the place of ours: matched, run, measured and timed beside it."""
+"""mjhill's muscle beside MuJoCo's own: matched, run in the same trials, measured and timed."""
 
 from mjhill.comparison.cost import StepCost as StepCost
 from mjhill.comparison.cost import step_cost as step_cost

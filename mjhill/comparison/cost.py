@@ -1,4 +1,4 @@
-"""Cost of a step with our muscles, with MuJoCo's and with none, measured in one interleaved run."""
+"""Time of a step with mjhill's muscles, with MuJoCo's and with none, in one interleaved run."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from mjhill.muscles.parts import Contractile
 from mjhill.simulate.run import check_warnings
 
 _INTEGRATORS = tuple(mujoco.mjtIntegrator.__members__.values())
-_DRIVE = 0.3  # control of the muscle that is on, the others are at a tenth of it
+_EXCITATION = 0.3  # of one muscle; the others have a tenth of it
 
 
 @dataclass(frozen=True)
 class StepCost:
-    """Medians over the rounds of what a step takes [µs], and their half interquartile ranges.
+    """Time of a step [µs]: medians over the rounds, and half of their interquartile ranges.
 
-    What a muscle adds and the ratio are taken within each round, where the machine's speed is
-    the same, and their medians after that.
+    The time that a muscle adds and the ratio are computed within each round, in which the
+    machine's speed is the same; the medians are taken afterwards.
 
     Attributes:
-        bare: With motors in the place of the muscles.
+        bare: With motors instead of muscles.
         native: With MuJoCo's muscles.
-        mjhill: With ours.
+        mjhill: With mjhill's muscles.
         bare_spread: Half of the interquartile range of ``bare``.
         native_spread: The same of ``native``.
         mjhill_spread: The same of ``mjhill``.
-        native_per_muscle: What one of MuJoCo's muscles adds to the bare step [µs].
-        mjhill_per_muscle: What one of ours adds [µs].
-        ratio: A whole step with our muscles over one with MuJoCo's [-].
+        native_per_muscle: Time that one of MuJoCo's muscles adds to the bare step [µs].
+        mjhill_per_muscle: Time that one of mjhill's muscles adds [µs].
+        ratio: A whole step with mjhill's muscles over one with MuJoCo's [-].
         muscles: Muscles in the model.
         muscle: Name of the muscle model that takes the place of ``hill``.
         rounds: Timed blocks of each model.
         steps: Steps in a block.
-        backend: What ran our muscles.
+        backend: The back-end of mjhill's muscles.
         integrator: MuJoCo's integrator.
     """
 
@@ -63,7 +63,7 @@ class StepCost:
     integrator: str
 
     def as_dict(self) -> dict[str, Any]:
-        """All of it, as what JSON can hold."""
+        """All values, ready for JSON."""
         return asdict(self)
 
 
@@ -77,19 +77,19 @@ def step_cost(
     integrator: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> StepCost:
-    """Time steps of the bare plant, with MuJoCo's muscles and with ours: A B C A B C ...
+    """Time steps of the bare plant, with MuJoCo's muscles and with mjhill's: A B C A B C ...
 
-    Each round times one block of steps of each model, so that a machine that slows down slows
-    all three. The muscle that is on changes from block to block, so the joint is in motion.
-    Our callbacks are installed throughout: the joint's exponential elasticity is in all three.
+    Each round times one block of steps of each model, so that a slower machine slows all three.
+    The excited muscle changes from block to block, so the joint moves. mjhill's callbacks are
+    installed all the time: all three models have the joint's exponential elasticity.
 
     Args:
         model: A joint's name, such as ``"elbow"``, or a path to an MJCF file.
         muscle: Name of the muscle model that takes the place of ``hill``.
         rounds: Timed blocks of each model.
         steps: Steps in a block.
-        backend: What runs our muscles.
-        integrator: MuJoCo's integrator, such as ``"Euler"``; the model's own without it.
+        backend: The back-end of mjhill's muscles.
+        integrator: MuJoCo's integrator, such as ``"Euler"``; by default the model's own.
         progress: Called now and then with the share done, 0 to 1.
 
     Raises:
@@ -137,8 +137,8 @@ def _time_blocks(
     times = np.empty((rounds, len(models)))
     for block in range(-3, rounds):  # three to warm up, overwritten by the first
         for kind, (model, data) in enumerate(zip(models, datas, strict=True)):
-            data.ctrl[:] = 0.1 * _DRIVE
-            data.ctrl[block % model.nu] = _DRIVE
+            data.ctrl[:] = 0.1 * _EXCITATION
+            data.ctrl[block % model.nu] = _EXCITATION
             start = time.perf_counter()
             mujoco.mj_step(model, data, nstep=steps)
             times[max(block, 0), kind] = time.perf_counter() - start
@@ -150,10 +150,10 @@ def _time_blocks(
 
 
 def bare_spec(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """A copy of a model in which a motor, as strong as the muscle, stands for each of ours.
+    """A copy of a model in which a motor of the same strength replaces each mjhill muscle.
 
     Raises:
-        ValueError: The model has no muscle of ours.
+        ValueError: The model has no mjhill muscle.
     """
 
     def convert(actuator: mujoco.MjsActuator, muscle: Contractile, length0: float) -> None:

@@ -1,4 +1,4 @@
-"""Matching: what MuJoCo's muscle shares with ours after the replacement, and what it cannot."""
+"""Which properties of MuJoCo's muscle equal those of mjhill's, and which cannot."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class Match:
         muscle: The actuator's name.
         quantity: What it is.
         unit: Its unit.
-        mjhill: Its value here; None where it is not a number.
-        native: Its value in MuJoCo's muscle; None where it is not a number.
-        how: How they were matched, or why they could not be.
+        mjhill: Its value in mjhill's muscle; None if it is not a number.
+        native: Its value in MuJoCo's muscle; None if it is not a number.
+        how: How the values were matched, or why they could not be.
     """
 
     muscle: str
@@ -47,7 +47,7 @@ class Match:
 
 
 def matching(model: str | Path, muscle: str | None = None) -> tuple[Match, ...]:
-    """What was matched and what could not be, for each muscle of a model.
+    """The matched and the unmatched quantities of each muscle of a model.
 
     The values of MuJoCo's muscle are read back from its compiled model.
 

@@ -101,16 +101,16 @@ def _two_lags_left(time: float, first: float, second: float) -> float:
     return (slow - fast) / (second - first)
 
 
-def native_delay(level: float, *, rising: bool) -> float:
-    """The same time for MuJoCo's muscle between 0 and ``level``, in units of its time constant.
+def native_delay(excitation: float, *, rising: bool) -> float:
+    """That time for MuJoCo's muscle between 0 and ``excitation``, in units of its time constant.
 
     The integral of ``tau(a)/(u - a)`` with ``tau(a) = 0.5 + 1.5 a`` on the way up from 0, and
     ``1/(0.5 + 1.5 a)`` on the way down to 0 (``mju_muscleDynamics``).
     """
     left = math.exp(-1)
     if rising:
-        return 0.5 + 1.5 * level - 1.5 * level * (1 - left)
-    return 2 * (1 + math.log((0.5 + 1.5 * level * left) / (0.5 + 1.5 * level)))
+        return 0.5 + 1.5 * excitation - 1.5 * excitation * (1 - left)
+    return 2 * (1 + math.log((0.5 + 1.5 * excitation * left) / (0.5 + 1.5 * excitation)))
 
 
 def native_model(model: str | Path) -> mujoco.MjModel:

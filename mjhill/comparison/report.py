@@ -5,10 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mjhill.comparison.native import compiled, native_spec, read_spec
 from mjhill.comparison.table import Comparison
 from mjhill.files import replacing
+
+if TYPE_CHECKING:
+    from mjhill.draw import View
 
 _VIDEO_SPEED = 0.25  # of real time
 
@@ -25,8 +29,8 @@ def write(
     Each file appears whole or not at all.
 
     Args:
-        comparison: What ``compare`` returned.
-        folder: Where to; made if it does not exist.
+        comparison: The result of ``compare``.
+        folder: The folder; created if it does not exist.
         video: Whether to render both models side by side, at a quarter of the speed.
         progress: Called while the video is made with the share done, 0 to 1.
 
@@ -35,7 +39,7 @@ def write(
 
     Raises:
         OSError: A file cannot be written.
-        RuntimeError: There is nothing to render or encode the video with.
+        RuntimeError: No renderer or no video encoder was found.
     """
     from mjhill.draw.plot import plot_overlay
 
@@ -57,18 +61,24 @@ def write(
     return paths
 
 
-def _write_video(
-    comparison: Comparison, path: Path, progress: Callable[[float], None] | None
-) -> Path:
-    from mjhill.draw import View, render
+def views_of(comparison: Comparison) -> list[View]:
+    """The views of the video: the pulses with mjhill's muscles, then with MuJoCo's."""
+    from mjhill.draw import View
 
     spec = read_spec(comparison.model)
     models = {"mjhill": compiled(spec), "native": compiled(native_spec(spec))}
     titles = {"mjhill": "mjhill", "native": "MuJoCo <muscle>"}
-    views = [
+    return [
         View(models[side], recording, titles[side])
         for side, recording in comparison.recordings["pulses"].items()
     ]
+
+
+def _write_video(
+    comparison: Comparison, path: Path, progress: Callable[[float], None] | None
+) -> Path:
+    from mjhill.draw import render
+
     count = None if progress is None else lambda done, total: progress(done / total)
-    render(views, path, speed=_VIDEO_SPEED, progress=count)
+    render(views_of(comparison), path, speed=_VIDEO_SPEED, progress=count)
     return path

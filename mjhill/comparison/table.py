@@ -1,4 +1,4 @@
-"""Both muscles in the same trials, measured side by side."""
+"""A model with mjhill's muscles and with MuJoCo's: the same trials, measured side by side."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ from mjhill.simulate.signals import Signal, pulse
 
 STEP_TIME = 2.0  # [s]
 PULSES_TIME, PULSE_WIDTH = 1.5, 0.1  # [s]
-QUIET, HIT_WIDTH, AFTER = 0.1, 0.02, 1.0  # before a hit, its width, after its start [s]
-_FITS = (("first 50 ms", 0.05), ("first 300 ms", 0.3))  # of the response to a hit [s]
+QUIET, IMPULSE_WIDTH, AFTER = 0.1, 0.02, 1.0  # before an impulse, its width, after its start [s]
+_FITS = (("first 50 ms", 0.05), ("first 300 ms", 0.3))  # of the response to an impulse [s]
+_IMPULSE_SHARE = 0.15  # of the agonist's maximum
 _SETTLING_BLOCK, _SETTLING_BLOCKS = 0.25, 240  # [s], number
 _REST_SPEED = 1e-5  # [rad/s or m/s]
 
@@ -35,7 +36,7 @@ Measure = tuple[str, str, float | None]  # quantity, unit, value; None where it 
 
 @dataclass(frozen=True)
 class Pair:
-    """A joint and two muscles that pull it either way.
+    """A joint and two muscles that pull it in opposite directions.
 
     Attributes:
         joint: The model's only joint.
@@ -43,7 +44,7 @@ class Pair:
         agonist: The first muscle that pulls towards positive positions.
         antagonist: The first muscle that pulls the other way.
         max_force: Maximum isometric force of the agonist [N·m or N].
-        max_load: What that puts on the joint [N·m or N].
+        max_load: The load on the joint at that force [N·m or N].
     """
 
     joint: str
@@ -55,7 +56,7 @@ class Pair:
 
 
 def find_pair(model: mujoco.MjModel) -> Pair:
-    """The joint of a model with our muscles, and the first muscle that pulls each way at home.
+    """The only joint of a model, and its first muscle in each direction at the home pose.
 
     Raises:
         ValueError: The model has not exactly one hinge or slide joint, or no muscle for one of
@@ -87,70 +88,70 @@ def find_pair(model: mujoco.MjModel) -> Pair:
     return Pair(joint, coordinate, agonist, antagonist, force, force * pulls[agonist])
 
 
-def run_step(model: mujoco.MjModel, pair: Pair, level: float) -> Recording:
-    """The agonist at ``level`` from the home pose on, the antagonist at rest."""
-    inputs = {pair.agonist: level, pair.antagonist: 0.0}
+def run_step(model: mujoco.MjModel, pair: Pair, excitation: float) -> Recording:
+    """A step of the agonist's excitation from the home pose, the antagonist at rest."""
+    excitations = {pair.agonist: excitation, pair.antagonist: 0.0}
     data = at_home(model)
     settle_muscles(model, data, 0.0)
-    return record(model, data, duration=STEP_TIME, excitation=inputs)
+    return record(model, data, duration=STEP_TIME, excitation=excitations)
 
 
 def run_pulses(model: mujoco.MjModel, pair: Pair) -> Recording:
     """A full pulse of the agonist and then one of the antagonist, from the home pose."""
-    inputs: Mapping[str, Signal] = {
+    excitations: Mapping[str, Signal] = {
         pair.agonist: pulse(1.0, 0.0, PULSE_WIDTH),
         pair.antagonist: pulse(1.0, PULSE_WIDTH, PULSE_WIDTH),
     }
     data = at_home(model)
     settle_muscles(model, data, 0.0)
-    return record(model, data, duration=PULSES_TIME, excitation=inputs)
+    return record(model, data, duration=PULSES_TIME, excitation=excitations)
 
 
 def run_impulse(
-    model: mujoco.MjModel, pair: Pair, level: float, position: float, hit: float
+    model: mujoco.MjModel, pair: Pair, excitation: float, position: float, impulse: float
 ) -> Recording:
-    """A short load ``hit`` on the joint, at rest at ``position`` with both muscles at ``level``.
+    """A short load on the joint, at rest at ``position`` with both muscles at ``excitation``.
 
-    A constant load keeps it at rest there until it is hit, and goes on after that.
+    A constant load holds the joint there before the impulse and stays on afterwards.
     """
     data = mujoco.MjData(model)
     data.qpos[0] = position
-    settle_muscles(model, data, level)
+    settle_muscles(model, data, excitation)
     mujoco.mj_forward(model, data)
     own = data.qfrc_passive[0] + data.qfrc_actuator[0] + data.qfrc_constraint[0]
-    load = pulse(hit, QUIET, HIT_WIDTH) + float(data.qfrc_bias[0] - own)
+    load = pulse(impulse, QUIET, IMPULSE_WIDTH) + float(data.qfrc_bias[0] - own)
     return record(model, data, duration=QUIET + AFTER, torque={pair.joint: load})
 
 
-def rest_position(model: mujoco.MjModel, level: float) -> float:
-    """Where the joint comes to rest with all muscles at ``level``, from the home pose.
+def rest_position(model: mujoco.MjModel, excitation: float) -> float:
+    """Where the joint comes to rest with all muscles at ``excitation``, from the home pose.
 
     Raises:
         RuntimeError: It does not come to rest.
     """
     data = at_home(model)
-    settle_muscles(model, data, level)
+    settle_muscles(model, data, excitation)
     block = max(1, round(_SETTLING_BLOCK / model.opt.timestep))
     for _ in range(_SETTLING_BLOCKS):
         mujoco.mj_step(model, data, nstep=block)
         if abs(data.qvel[0]) < _REST_SPEED:
             return float(data.qpos[0])
     raise RuntimeError(
-        f"with its muscles at {level:g} the joint still moves at {data.qvel[0]:.2g} per second "
-        f"after {_SETTLING_BLOCK * _SETTLING_BLOCKS:g} s; choose another level"
+        f"with its muscles at {excitation:g} the joint still moves at {data.qvel[0]:.2g} per "
+        f"second after {_SETTLING_BLOCK * _SETTLING_BLOCKS:g} s; choose another excitation"
     )
 
 
-def settle_muscles(model: mujoco.MjModel, data: mujoco.MjData, level: float) -> None:
-    """Set the controls to ``level`` and every muscle's states to what they settle at."""
-    data.ctrl[:] = level
+def settle_muscles(model: mujoco.MjModel, data: mujoco.MjData, excitation: float) -> None:
+    """Set all controls to ``excitation`` and the muscles' states to their steady values."""
+    data.ctrl[:] = excitation
     native = model.actuator_gaintype == mujoco.mjtGain.mjGAIN_MUSCLE
-    data.act[model.actuator_actadr[native]] = level
+    data.act[model.actuator_actadr[native]] = excitation
     equilibrate(model, data)
 
 
 def step_measures(pair: Pair, run: Recording) -> Iterator[Measure]:
-    """What is measured in the answer to a step."""
+    """Measures of the response to a step."""
     time = run.time
     position, unit = shown(run, f"{pair.joint}.{pair.coordinate}")
     speed, speed_unit = shown(run, f"{pair.joint}.velocity")
@@ -165,7 +166,7 @@ def step_measures(pair: Pair, run: Recording) -> Iterator[Measure]:
 
 
 def pulses_measures(pair: Pair, run: Recording) -> Iterator[Measure]:
-    """What is measured in the answer to a pair of pulses."""
+    """Measures of the response to a pair of pulses."""
     time = run.time
     position, unit = shown(run, f"{pair.joint}.{pair.coordinate}")
     speed, speed_unit = shown(run, f"{pair.joint}.velocity")
@@ -180,10 +181,10 @@ def pulses_measures(pair: Pair, run: Recording) -> Iterator[Measure]:
 
 
 def impulse_measures(pair: Pair, inertia: float, run: Recording) -> Iterator[Measure]:
-    """What is measured in the answer to a hit on a joint that moves ``inertia``.
+    """Measures of the response to an impulse on a joint with ``inertia`` [kg·m² or kg].
 
     Stiffness and damping are those of a second-order fit, over the first 50 ms (short-range
-    stiffness, before the contractile element has given way) and over the first 300 ms.
+    stiffness, before the contractile element yields) and over the first 300 ms.
     """
     start = int(np.searchsorted(run.time, QUIET - 1e-9))
     time = run.time[start:]
@@ -210,23 +211,20 @@ def impulse_measures(pair: Pair, inertia: float, run: Recording) -> Iterator[Mea
 
 
 def shown(run: Recording, name: str) -> tuple[NDArray[np.float64], str]:
-    """Values and unit as people read them: angles in degrees."""
+    """Values and unit for a table: angles in degrees."""
     values, unit = run[name], run.units[name]
     degrees = {"rad": "°", "rad/s": "°/s"}
     return (np.degrees(values), degrees[unit]) if unit in degrees else (values, unit)
 
 
 def inertia(model: mujoco.MjModel, position: float) -> float:
-    """What the joint moves [kg·m² or kg]."""
+    """Inertia of all that the joint moves [kg·m² or kg]."""
     data = mujoco.MjData(model)
     data.qpos[0] = position
     mujoco.mj_forward(model, data)
     dense = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, dense)
     return float(dense[0, 0])
-
-
-_HIT_SHARE = 0.15  # of the agonist's maximum
 
 
 @dataclass(frozen=True)
@@ -237,8 +235,8 @@ class Row:
         task: The task it was measured in, a key of ``Comparison.recordings``.
         quantity: What it is.
         unit: Its unit.
-        mjhill: With our muscles; None where the run was too short to show it.
-        native: With MuJoCo's; None likewise.
+        mjhill: With mjhill's muscles; None if the run was too short to show it.
+        native: With MuJoCo's muscles; None for the same reason.
     """
 
     task: str
@@ -249,7 +247,7 @@ class Row:
 
     @property
     def ratio(self) -> float | None:
-        """Ours over MuJoCo's [-]; None where there is none."""
+        """mjhill's value over MuJoCo's [-]; None where there is none."""
         if self.mjhill is None or not self.native:
             return None
         return self.mjhill / self.native
@@ -260,13 +258,13 @@ class Comparison:
     """Both kinds of muscle on the same tasks.
 
     Attributes:
-        model: What was compared.
+        model: Name or path of the model.
         pair: The joint and its muscles.
-        tasks: What was done, in words, by task.
-        matching: What the two kinds of muscle share, and what they cannot.
-        rows: What was measured.
+        tasks: A description of each task, by task.
+        matching: Which properties of the two muscles are equal, and which cannot be.
+        rows: The measures.
         recordings: By task, and then by ``mjhill`` or ``native``.
-        cost: What a step takes; None where it was not measured.
+        cost: Time of a step; None if it was not measured.
     """
 
     model: str
@@ -278,7 +276,7 @@ class Comparison:
     cost: StepCost | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """All but the recordings, as what JSON can hold."""
+        """Everything except the recordings, ready for JSON."""
         return {
             "model": self.model,
             "pair": asdict(self.pair),
@@ -293,56 +291,57 @@ def compare(
     model: str | Path = "elbow",
     *,
     muscle: str | None = None,
-    level: float = 0.5,
-    levels: tuple[float, float] = (0.1, 0.5),
-    hit: float | None = None,
+    excitation: float = 0.5,
+    co_contractions: tuple[float, float] = (0.1, 0.5),
+    impulse: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Comparison:
     """Run a model with mjhill's muscles and with MuJoCo's through the same tasks; measure both.
 
-    The tasks are ``step`` and ``pulses`` from the home pose, and ``impulse <level>``: a load for
-    20 ms on the joint at rest, with both muscles co-contracted. Every hit finds the joint in one
-    posture, where ours comes to rest at the first level; a constant load holds it there. With
-    MuJoCo's muscles, our callbacks add the joint's exponential elasticity, as they do with ours.
+    The tasks are ``step`` and ``pulses`` from the home pose, and ``impulse <co-contraction>``: a
+    load for 20 ms on the joint at rest, with both muscles co-contracted. All impulses start from
+    one posture, in which mjhill's model rests at the first co-contraction; a constant load holds
+    the joint there. Both models have the joint's exponential elasticity from mjhill's callbacks.
 
     Args:
         model: A joint's name, such as ``"elbow"``, or a path to an MJCF file with one joint.
         muscle: Name of the muscle model that takes the place of ``hill``, such as ``hill-rigid``.
-        level: Excitation of the step, in (0, 1].
-        levels: Two excitations of co-contraction, in (0, 1].
-        hit: Torque [N·m] or force [N] on the joint; without it, 15 % of what the agonist's
-            maximum isometric force puts there.
+        excitation: Excitation of the step, in (0, 1].
+        co_contractions: Two different excitations of both muscles, in (0, 1].
+        impulse: Torque [N·m] or force [N] of the impulse; by default 15 % of the load at the
+            agonist's maximum isometric force.
         progress: Called after each task with the share done, 0 to 1.
 
     Raises:
-        ValueError: An input is out of range, the model has not one joint with an antagonistic
-            pair, or as ``native_model``.
+        ValueError: An argument is out of range, the model does not have exactly one joint with
+            an antagonistic pair, or as ``native_model``.
         RuntimeError: MuJoCo warned of a bad state, or the joint does not come to rest.
     """
-    _check_inputs(level, levels, hit)
+    _check_arguments(excitation, co_contractions, impulse)
     spec = read_spec(model, muscle)
     models = {"mjhill": compiled(spec), "native": compiled(native_spec(spec))}
     pair = find_pair(models["mjhill"])
-    load = _HIT_SHARE * pair.max_load if hit is None else hit
+    load = _IMPULSE_SHARE * pair.max_load if impulse is None else impulse
     with installed():
-        posture = rest_position(models["mjhill"], levels[0])
+        posture = rest_position(models["mjhill"], co_contractions[0])
         runs: dict[str, Callable[[mujoco.MjModel], Recording]] = {
-            "step": partial(run_step, pair=pair, level=level),
+            "step": partial(run_step, pair=pair, excitation=excitation),
             "pulses": partial(run_pulses, pair=pair),
         }
-        for each in levels:
+        for each in co_contractions:
             runs[_impulse(each)] = partial(
-                run_impulse, pair=pair, level=each, position=posture, hit=load
+                run_impulse, pair=pair, excitation=each, position=posture, impulse=load
             )
         recordings = {}
         for index, (task, run) in enumerate(runs.items()):
             recordings[task] = {side: run(models[side]) for side in models}
             if progress is not None:
                 progress((index + 1) / len(runs))
+    first = recordings[_impulse(co_contractions[0])]["mjhill"]
     return Comparison(
         str(model),
         pair,
-        _tasks(pair, recordings[_impulse(levels[0])]["mjhill"], level, levels, load),
+        _tasks(pair, first, excitation, co_contractions, load),
         matching(model, muscle),
         tuple(_rows(pair, recordings, inertia(models["mjhill"], posture))),
         recordings,
@@ -360,38 +359,45 @@ def check(model: str | Path, muscle: str | None = None) -> None:
     find_pair(compiled(spec))
 
 
-def _check_inputs(level: float, levels: tuple[float, float], hit: float | None) -> None:
-    for name, value in (("level", level), *(("levels", each) for each in levels)):
+def _check_arguments(
+    excitation: float, co_contractions: tuple[float, float], impulse: float | None
+) -> None:
+    named = [("excitation", excitation), *(("co_contractions", each) for each in co_contractions)]
+    for name, value in named:
         if not 0 < value <= 1:
             raise ValueError(f"{name} must be in (0, 1], got {value}")
-    if len({f"{each:g}" for each in levels}) != 2:
-        raise ValueError(f"levels must be two different ones, got {levels}")
-    if hit is not None and not (np.isfinite(hit) and hit > 0):
-        raise ValueError(f"hit must be positive and finite, got {hit}")
+    if len({f"{each:g}" for each in co_contractions}) != 2:
+        raise ValueError(f"co_contractions must be two different ones, got {co_contractions}")
+    if impulse is not None and not (np.isfinite(impulse) and impulse > 0):
+        raise ValueError(f"impulse must be positive and finite, got {impulse}")
 
 
 def _tasks(
-    pair: Pair, run: Recording, level: float, levels: tuple[float, float], hit: float
+    pair: Pair,
+    run: Recording,
+    excitation: float,
+    co_contractions: tuple[float, float],
+    impulse: float,
 ) -> dict[str, str]:
-    """What is done in each task, in words; ``run`` is of a hit."""
+    """A description of each task; ``run`` is one of the impulses."""
     posture, unit = shown(run, f"{pair.joint}.{pair.coordinate}")
     where = f"{posture[0]:.4g}{unit if unit == '°' else ' ' + unit}"
     load_unit = run.units[f"{pair.joint}.applied"]
-    pulse, blow = (f"{1e3 * width:g} ms" for width in (PULSE_WIDTH, HIT_WIDTH))
+    pulse, short = (f"{1e3 * width:g} ms" for width in (PULSE_WIDTH, IMPULSE_WIDTH))
     words = {
-        "step": f"{pair.agonist} at {level:g} from the home pose",
+        "step": f"{pair.agonist} at {excitation:g} from the home pose",
         "pulses": f"{pair.agonist} at 1 for {pulse}, then {pair.antagonist}, from the home pose",
     }
-    for each in levels:
+    for each in co_contractions:
         words[_impulse(each)] = (
-            f"{hit:.3g} {load_unit} for {blow} on the joint at rest at {where}, "
+            f"{impulse:.3g} {load_unit} for {short} on the joint at rest at {where}, "
             f"both muscles at {each:g}"
         )
     return words
 
 
-def _impulse(level: float) -> str:
-    return f"impulse {level:g}"
+def _impulse(co_contraction: float) -> str:
+    return f"impulse {co_contraction:g}"
 
 
 def _rows(

@@ -1,4 +1,4 @@
-"""Published facts about human joints, beside what a joint does in simulation.
+"""Published facts about human joints, as published and as measured in simulation.
 
 Every measure takes the joint and the muscle concerned, then its own arguments, and returns SI.
 """

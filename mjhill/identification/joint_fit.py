@@ -39,6 +39,7 @@ def identify(
 
     Returns:
         The fitted joint, an estimate of each parameter, and the predictions of the measurements.
+        Print it, or save it with ``mjhill.identification.write``.
 
     Raises:
         ValueError: The joint is unknown, a measurement cannot be read, an option does not go

@@ -25,17 +25,18 @@ _SHAPE_SAMPLES = 60
 _SETTLED = 5.0  # duration of a run, in units of the largest T1 + T2 ...
 _SHORTEST = 0.8  # ... and at least this [s]
 _TIMESTEP = 1e-3  # [s]
+_NEAR = 1.3  # ratio of T1 to T2 below which only their sum is well determined
 
 _Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """The evidence on one joint.
+    """What is published about one joint.
 
     Attributes:
-        joint: The joint, of which the free parameters are not looked at.
-        steps: Hill and row of Table 2, for each run.
+        joint: The joint; the values of its free parameters are ignored.
+        steps: Muscle and row of Table 2, for each run.
         torques: Published passive torques.
         ends: Published ends of the active range of motion.
     """
@@ -53,25 +54,25 @@ class Evidence:
         return np.asarray(np.arange(round(duration / _TIMESTEP) + 1) * _TIMESTEP)
 
     def responses(self, joints: list[Joint]) -> _Values:
-        """How far each step goes in joints that differ in their parameters [rad].
+        """Movement from the start in each step, for joints that differ in their parameters [rad].
 
         Shape (joints, steps, T).
         """
         muscles, time = list(self.joint.muscles), self.time
-        inputs = np.zeros((len(joints), len(self.steps), len(muscles)))
+        excitations = np.zeros((len(joints), len(self.steps), len(muscles)))
         start = np.empty((len(joints), len(self.steps)))
         for k, (name, row) in enumerate(self.steps):
-            inputs[:, k, muscles.index(name)] = row.level
+            excitations[:, k, muscles.index(name)] = row.level
             start[:, k] = [joint.postures[name] for joint in joints]
-        runs = joint_angles(
+        simulated = joint_angles(
             [joint for joint in joints for _ in self.steps],
             start=start.ravel(),
-            excitation=inputs.reshape(-1, 1, len(muscles)),
+            excitation=excitations.reshape(-1, 1, len(muscles)),
             steps=len(time) - 1,
             timestep=_TIMESTEP,
         ).reshape(len(joints), len(self.steps), len(time))
         signs = np.array([-np.sign(self.joint.gears[name]) for name, _ in self.steps])
-        return np.asarray(signs[:, None] * (runs - start[:, :, None]))
+        return np.asarray(signs[:, None] * (simulated - start[:, :, None]))
 
     def residuals(self, free: list[Free], points: _Values) -> _Values:
         """Residuals at K points of P deviations, (P, K) -> (R, K)."""
@@ -82,21 +83,22 @@ class Evidence:
             parts.append(self._step_residuals(self.responses(joints)))
         return np.ascontiguousarray(np.concatenate(parts, axis=1).T)
 
-    def _step_residuals(self, gone: _Values) -> _Values:
+    def _step_residuals(self, responses: _Values) -> _Values:
+        """Residuals of the steps' ends, delays and shapes, (K, steps, T) -> (K, R)."""
         time = self.time
         pick = np.unique(np.linspace(0, len(time) - 1, _SHAPE_SAMPLES).astype(int))
         magnitude = np.array([row.magnitude for _, row in self.steps])
         delay = np.array([sum(row.time_constants) for _, row in self.steps])
         wanted = np.array([step_response(time, *row.time_constants) for _, row in self.steps])
-        share = gone / magnitude[:, None]
+        share = responses / magnitude[:, None]
         end = share[:, :, -1]
         # the area above a step response is its mean delay, which is T1 + T2 of a second-order one
-        late = np.trapezoid(wanted - share / end[:, :, None], time, axis=2)
+        delay_error = np.trapezoid(wanted - share / end[:, :, None], time, axis=2)
         shape = (share - wanted)[:, :, pick] / (SHAPE_SPREAD * np.sqrt(len(pick)))
         parts = [
             (end - 1) / MAGNITUDE_SPREAD,
-            late / (DELAY_SPREAD * delay),
-            shape.reshape(len(gone), -1),
+            delay_error / (DELAY_SPREAD * delay),
+            shape.reshape(len(responses), -1),
         ]
         return np.concatenate(parts, axis=1)
 
@@ -108,16 +110,13 @@ class Evidence:
 
 
 def evidence_on(joint: Joint) -> Evidence:
-    """The evidence that comes with mjhill on one of its joints."""
+    """The published data about a joint that come with mjhill."""
     steps = tuple((muscle, row) for row in rows_of(joint) for muscle in row.muscles)
     return Evidence(joint, steps, tuple(passive_torques(joint.name)), tuple(end_angles(joint.name)))
 
 
-_NEAR = 1.3  # ratio of T1 to T2 below which the two say little singly
-
-
 def step_rows(joint: Joint) -> list[dict[str, Any]]:
-    """Table 2 beside a joint's own steps, one row a cell; angles in degrees, times in ms."""
+    """Table 2 beside the joint's own steps, one row for each step; degrees and ms."""
     evidence = evidence_on(joint)
     rows = []
     for (muscle, row), fit in zip(evidence.steps, evidence.fits(joint), strict=True):
@@ -204,7 +203,7 @@ def from_literature(
         progress: Called with the share done, 0 to 1.
 
     Raises:
-        ValueError: The file has no such joint, or the literature nothing on it.
+        ValueError: The file has no such joint, or nothing is published about it.
         RuntimeError: The fit did not settle.
     """
     free = free_parameters(joint, parameters)
@@ -221,7 +220,7 @@ def from_literature(
 
 
 def check_evidence(joints: Iterable[str], parameters: str | Path | None = None) -> None:
-    """Refuse joints that the literature says nothing on, before long work on others.
+    """Refuse joints without published data, before long work on others.
 
     Raises:
         ValueError: There is such a joint; the message names it.

@@ -218,7 +218,7 @@ def from_measurements(
     Each measurement starts with muscles steady at its first inputs, at an angle and a velocity
     that are fitted besides. Its inputs go straight from sample to sample. The priors are those of
     ``mjhill.identification.fit``: a parameter that the data say nothing about stays in the
-    middle of its bounds, and ``Estimate.informed`` tells.
+    middle of its bounds, and ``Estimate.informed`` is near 0.
 
     Args:
         joint: The joint's name.

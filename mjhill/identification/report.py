@@ -1,8 +1,9 @@
-"""What a fit found: tables, a page, pictures and a parameter file."""
+"""The results of a fit as files: tables, a page, plots and a parameter file."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import degrees
 from pathlib import Path
 from typing import Any
@@ -12,14 +13,108 @@ import numpy as np
 from mjhill.analysis.second_order import step_response
 from mjhill.draw.bellies import MUSCLE_COLOURS
 from mjhill.draw.plot import take_literally
-from mjhill.files import replacing
-from mjhill.identification.facts import Fact
+from mjhill.files import check_writable, replacing
+from mjhill.identification.facts import Fact, facts
 from mjhill.identification.fit import Identified
 from mjhill.identification.literature_fit import Evidence, evidence_on, published_rows, step_rows
 from mjhill.identification.movement import Prediction
 from mjhill.joints.joint import Joint
-from mjhill.joints.reader import parameter_file
+from mjhill.joints.reader import parameter_file, read_joints
 from mjhill.simulate.reference import plant_torque
+
+_DPI = 110
+_DIGITS = 4  # significant, of fitted values in a parameter file
+
+
+def output_files(
+    joints: Iterable[str], folder: str | Path, *, measured: bool = False
+) -> dict[str, Path]:
+    """The files that ``write`` makes in a folder, by what they hold.
+
+    Args:
+        joints: Names of the fitted joints.
+        folder: The folder.
+        measured: Whether all joints are fitted to measurements; then there is no page.
+    """
+    folder = Path(folder)
+    page = {} if measured else {"page": folder / "report.md"}
+    return {
+        "parameters": folder / "joints.toml",
+        "numbers": folder / "identify.json",
+        **page,
+        **{name: folder / f"{name}.png" for name in joints},
+    }
+
+
+def write(
+    results: Identified | Sequence[Identified],
+    folder: str | Path,
+    *,
+    parameters: str | Path | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> dict[str, list[dict[str, Any]]]:
+    """Write fitted joints: parameter file, tables (JSON), a page (Markdown) and plots (PNG).
+
+    A fit to the literature is reported with its agreement with Table 2, with published torques
+    and ranges, and with facts that no fit used. These are computed from the parameter file as
+    written, with its four digits. A fit to measurements is reported with its predictions. Each
+    file appears whole or not at all; for their names see ``output_files``.
+
+    Args:
+        results: One or more results of ``identify``, each of another joint.
+        folder: The folder; created if it does not exist.
+        parameters: The parameter file that was given to ``identify``.
+        progress: Called with the share done of measuring the facts, 0 to 1.
+
+    Returns:
+        The tables, by title: rows of equal keys.
+
+    Raises:
+        ValueError: There is no result, or the parameter file lacks one of the joints.
+        OSError: A file cannot be written.
+    """
+    results = [results] if isinstance(results, Identified) else list(results)
+    if not results:
+        raise ValueError("there is no result to write; give at least one result of identify")
+    measured = [result for result in results if result.predictions]
+    names = [result.joint.name for result in results]
+    files = output_files(names, folder, measured=len(measured) == len(results))
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for path in files.values():
+        check_writable(path)
+    write_parameters(files["parameters"], results, parameters)
+    written = read_joints(files["parameters"])
+    fitted = {
+        name: written[name] for name, one in zip(names, results, strict=True) if not one.predictions
+    }
+    report = _literature_tables(fitted, progress) if fitted else {}
+    for name, joint in fitted.items():
+        plot_literature(joint, files[name])
+    for result in measured:
+        plot_predictions(result.joint.name, result.predictions, files[result.joint.name])
+        report.setdefault("Measurements", []).extend(prediction_rows(result.predictions))
+    report["Parameters"] = [row for result in results for row in estimate_rows(result)]
+    if fitted:
+        _write_text(files["page"], markdown(report))
+    _write_text(files["numbers"], json.dumps(report, ensure_ascii=False, indent=1))
+    return report
+
+
+def _literature_tables(
+    joints: Mapping[str, Joint], progress: Callable[[float], None] | None
+) -> dict[str, list[dict[str, Any]]]:
+    return {
+        "Table 2": [row for joint in joints.values() for row in step_rows(joint)],
+        "Passive torques and ranges of motion": [
+            row for joint in joints.values() for row in published_rows(joint)
+        ],
+        "Not used by the fit": fact_rows(facts(joints, progress)),
+    }
+
+
+def _write_text(path: Path, text: str) -> None:
+    with replacing(path) as partial:
+        partial.write_text(text, encoding="utf-8")
 
 
 def estimate_rows(result: Identified) -> list[dict[str, Any]]:
@@ -59,7 +154,7 @@ def prediction_rows(predictions: Sequence[Prediction]) -> list[dict[str, Any]]:
 
 
 def fact_rows(facts: Sequence[Fact]) -> list[dict[str, Any]]:
-    """Facts that no fit used, beside what a joint does, one row each."""
+    """Facts that no fit used, as published and as measured in simulation, one row each."""
     return [
         {
             "joint": fact.joint,
@@ -77,11 +172,11 @@ def fact_rows(facts: Sequence[Fact]) -> list[dict[str, Any]]:
 
 
 def brief(joint: Joint, held_out: Sequence[Fact]) -> dict[str, Any]:
-    """How well a joint meets the literature, in one row.
+    """How well a joint agrees with the literature, in one row.
 
     Args:
         joint: The joint.
-        held_out: Facts that no fit used; those about other joints are not looked at.
+        held_out: Facts that no fit used; those about other joints are ignored.
     """
     steps, published = step_rows(joint), published_rows(joint)
     own = [fact for fact in held_out if fact.joint == joint.name]
@@ -158,9 +253,6 @@ prior's variance that the data took away, by the width of the interval.""",
 }
 
 
-_DPI = 110
-
-
 def plot_literature(joint: Joint, path: str | Path) -> None:
     """Draw a joint's steps beside Table 2, and its passive torque beside published ones.
 
@@ -178,7 +270,7 @@ def plot_literature(joint: Joint, path: str | Path) -> None:
 
 
 def plot_predictions(joint: str, predictions: Sequence[Prediction], path: str | Path) -> None:
-    """Draw each measurement, what the fitted joint makes of its inputs, and these inputs.
+    """Draw each measurement, the fitted joint's prediction of it, and the excitations.
 
     Raises:
         ValueError: The path does not end in .png.
@@ -269,9 +361,6 @@ def _save(figure: Any, path: str | Path) -> None:
         figure.savefig(partial)
 
 
-_DIGITS = 4  # significant
-
-
 def parameter_text(results: Iterable[Identified], parameters: str | Path | None = None) -> str:
     """The text of a parameter file with the values of some joints replaced by fitted ones.
 
@@ -299,8 +388,7 @@ def write_parameters(
     Raises:
         OSError: The folder is missing or cannot be written.
     """
-    with replacing(path) as partial:
-        partial.write_text(parameter_text(results, parameters), encoding="utf-8")
+    _write_text(Path(path), parameter_text(results, parameters))
 
 
 def rounded(value: float, low: float, high: float) -> float:

@@ -22,10 +22,10 @@ class PassiveTorque:
 
     Attributes:
         joint: The joint's name.
-        angle: Where [rad].
-        low: Least that agrees with the literature [N·m].
-        high: Most.
-        source: Where it comes from.
+        angle: Joint angle [rad].
+        low: Lower end of the published interval [N·m].
+        high: Upper end [N·m].
+        source: The publications.
     """
 
     joint: str
@@ -62,9 +62,9 @@ class EndAngle:
     Attributes:
         joint: The joint's name.
         muscle: The muscle.
-        low: Least that agrees with the literature [rad].
-        high: Most.
-        source: Where it comes from.
+        low: Lower end of the published interval [rad].
+        high: Upper end [rad].
+        source: The publications.
     """
 
     joint: str
@@ -116,9 +116,9 @@ def _rows(joint: str, quantity: str) -> list[dict[str, str]]:
 def _balance(joint: Joint, agonist: str) -> float:
     from scipy.optimize import brentq
 
-    def net(gone: float) -> float:
-        """Torque [N·m] towards the agonist's side, so far from rest [rad]."""
-        angle = joint.rest_angle + sign * gone
+    def net(travel: float) -> float:
+        """Torque [N·m] towards the agonist's side, at ``travel`` [rad] from rest."""
+        angle = joint.rest_angle + sign * travel
         total = plant_torque(joint, angle)
         for name, muscle in joint.hill_muscles.items():
             share = isometric_share(muscle, float(name == agonist), joint.gears[name] * angle)

@@ -24,15 +24,15 @@ class Row:
     Attributes:
         movement: As printed, such as ``Elbow flexion``.
         joint: The joint's name.
-        muscles: The muscles it holds for: one, or both of a joint that it does not tell apart.
-        level: Neural input [-].
-        magnitude: MAG, how far the step goes [rad].
+        muscles: The muscles it holds for: one, or both where the row names no direction.
+        level: Excitation [-].
+        magnitude: MAG, the movement from start to end [rad].
         time_constants: T1 and T2 [s], corrected.
         printed: T1 and T2 [s], as printed.
         stiffness: K of the fit [N·m/rad], as printed.
         damping: B of the fit [N·m·s/rad], as printed.
-        gain: K MAG over input and maximum torque [-], as printed; what it is was inferred.
-        note: What is wrong with the printed ones; empty where nothing is.
+        gain: K MAG over input and maximum torque [-], as printed; the paper does not define it.
+        note: What is wrong with the printed values; empty if nothing is.
     """
 
     movement: str
