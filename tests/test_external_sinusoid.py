@@ -36,7 +36,7 @@ def test_a_spring_and_a_damper_have_the_textbook_response(damping):
     """Also overdamped: at 2 N·m·s/rad the damping ratio is 1.3."""
     joint = passive_joint(damping)
     band = np.geomspace(0.5, 20.0, 16)
-    oscillation = Oscillation("shaken", 0.0, {}, 0.1)
+    oscillation = Oscillation("torque", {}, 0.1)
     (curve,) = frequency_responses(
         build_rig(joint, exact=True), joint.rest_angle, [oscillation], band
     )
@@ -51,7 +51,7 @@ def test_a_spring_and_a_damper_have_the_textbook_response(damping):
 
 def test_a_response_that_only_falls_has_no_resonance():
     band = np.array([1.0, 2.0, 4.0])
-    flat = Curve(Oscillation("", 0.0, {}), 0.0, band, 1 / band**3, np.zeros(3), np.ones(3))
+    flat = Curve(Oscillation("", {}), 0.0, band, 1 / band**3, np.zeros(3), np.ones(3))
     assert flat.resonance is None
     assert flat.low_gain == 1.0
 
@@ -83,11 +83,15 @@ def test_half_the_torque_gives_the_same_gain():
     """Small enough to be linear."""
     pair = [
         external_sinusoid(
-            "elbow", bias=(0.1, 0.2), cocontraction=(0.2, 0.5), band=(1.0, 8.0), angle=1.9,
+            "elbow",
+            bias=(0.1, 0.2),
+            cocontraction=(0.2, 0.5),
+            band=(1.0, 8.0),
+            angle=1.9,
             deflection=deflection,
         ).bias[0]
         for deflection in (0.02, 0.01)
-    ]  # fmt: skip
+    ]
     np.testing.assert_allclose(pair[0].gain, pair[1].gain, rtol=0.03)
 
 

@@ -95,9 +95,9 @@ def test_the_fit_of_a_band_is_off_by_no_more_than_allowed():
     gain, phase = np.abs(response), np.angle(response)
     fit, highest = second_order_band(BAND, gain, phase)
     inside = highest >= BAND
-    off_gain, off_phase = fit.errors(BAND[inside], gain[inside], phase[inside])
-    assert np.abs(off_gain).max() <= 3.0
-    assert np.abs(off_phase).max() <= radians(30.0)
+    gain_errors, phase_errors = fit.errors(BAND[inside], gain[inside], phase[inside])
+    assert np.abs(gain_errors).max() <= 3.0
+    assert np.abs(phase_errors).max() <= radians(30.0)
 
 
 def test_decibels_are_twenty_for_ten():

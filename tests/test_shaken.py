@@ -18,7 +18,7 @@ def wild(elbow):
 
 
 def test_a_joint_that_cannot_be_simulated_has_no_frequency_response(wild):
-    oscillation = Oscillation("shaken", 0.0, {}, 1e3)
+    oscillation = Oscillation("torque", {}, 1e3)
     with pytest.raises(UnmeasuredError, match="elbow: MuJoCo warned"):
         frequency_responses(build_rig(wild), wild.rest_angle, [oscillation], np.array([2.0, 4.0]))
 

@@ -116,7 +116,7 @@ def fit_second_order(
     band, gains = np.asarray(frequency, dtype=np.float64), np.asarray(gain, dtype=np.float64)
     if band.ndim != 1 or len(band) < 2 or not (band.min() > 0 and gains.min() > 0):
         raise ValueError(
-            "a second-order fit needs two or more frequencies, all positive like the gains, got "
+            "a second-order fit needs at least two frequencies, all positive like the gains, got "
             f"frequencies {band.tolist()} and gains {gains.tolist()}"
         )
     measured, top = _complex(gains, phase), float(gains[band.argmin()])

@@ -313,9 +313,7 @@ def external_impulse(
     middle = list(held.values())[len(held) // 2]
     answer = impulse_with_burst(impulse, joint, middle, size=larger * size, height=burst)
     report(1.0)
-    runs = {
-        f"{k} at {one.cocontraction:g}": one.run for k, ones in responses.items() for one in ones
-    }
+    runs = {f"{k} at {r.cocontraction:g}": r.run for k, some in responses.items() for r in some}
     recordings = MappingProxyType({**runs, "burst": answer.run})
     return ExternalImpulse(
         joint.name, angle, sign, body, held, not_held, **responses, burst=answer,

@@ -66,14 +66,12 @@ class Oscillation:
 
     Attributes:
         label: Its name, such as ``bias of 10 %``.
-        level: Excitation of the bias muscle, or co-contraction [-].
         excitations: Mean excitation of each muscle [-]; a constant external torque balances them.
         torque: Amplitude of the external torque [N·m].
         amplitudes: Amplitude of each muscle's excitation, with its sign [-]; None for a torque.
     """
 
     label: str
-    level: float
     excitations: Mapping[str, float]
     torque: float = 0.0
     amplitudes: Mapping[str, float] | None = None
@@ -218,7 +216,8 @@ class ExternalSinusoid(Result):
         if self.neural is not None:
             # its gain is scaled to that of the torque at the lowest frequency
             external = self.cocontraction[len(self.cocontraction) // 2]
-            label = f"neural at {self.neural.oscillation.level:g}, from the same gain"
+            highest = max(self.neural.oscillation.excitations.values())
+            label = f"neural at {highest:g}, from the same gain"
             scale = external.low_gain / self.neural.low_gain
             style = {"color": MUSCLE_COLOURS[0], "ls": "--", "label": label}
             _draw_curve(grid[:, 1], self.neural, scale, **style)
@@ -252,9 +251,9 @@ def external_sinusoid(
         muscle: The muscle that holds the bias; by default the first.
         bias: Excitations of that muscle, ascending [-].
         cocontraction: Co-contractions [-], ascending.
-        band: Lowest and highest frequency [Hz]; by default 0.3 to 30, extended to reach from half
-            the natural frequency of the relaxed joint to ten times it. For a fast joint the lower
-            end is at least a twentieth of the natural frequency.
+        band: Lowest and highest frequency [Hz]; by default 0.3 to 30, extended where needed to
+            reach from half to ten times the natural frequency of the relaxed joint, with a lower
+            end of at least a twentieth of it.
         angle: The posture [rad]; by default the home angle or, if the joint does not stay there
             under every condition, the angle at which it is most stable.
         deflection: Deflection of the relaxed joint by the torque's amplitude [rad].
@@ -270,34 +269,28 @@ def external_sinusoid(
     cocontraction = check_ascending("cocontraction", cocontraction, 0.0, 1.0)
     check_angle(joint, angle)
     check_between("deflection", deflection, 0.0, 0.5 * (joint.range[1] - joint.range[0]), "rad")
-    alone = {f"bias of {u:.0%}": (u, _only(joint, muscle, u)) for u in bias}
-    both = {
-        f"co-contraction {u:g}": (u, partial(balancing_excitations, joint, u))
-        for u in cocontraction
+    alone = {f"bias of {u:.0%}": _only(joint, muscle, u) for u in bias}
+    both: dict[str, Condition] = {
+        f"co-contraction {u:g}": partial(balancing_excitations, joint, u) for u in cocontraction
     }
     if angle is None:
-        angle = stablest_angle(joint, [condition for _, condition in (alone | both).values()])
+        angle = stablest_angle(joint, list((alone | both).values()))
     relaxed = static_stiffness(joint, {}, angle)
     if relaxed <= 0:
         raise UnmeasuredError(f"relaxed, {joint.name} drifts away from {degrees(angle):.3g}°")
     frequency = _frequencies(joint, band, relaxed)
     held, not_held = _oscillations(joint, alone | both, angle, relaxed * deflection)
-    contracting = [held[label] for label in both if label in held]
-    neural = [_neural(joint, one) for one in contracting[len(contracting) // 2 :][:1]]
+    middle = [held[label] for label in both if label in held]
+    neural = [_neural(joint, one) for one in middle[len(middle) // 2 :][:1]]
     rig = build_rig(joint, exact=True)
     found = frequency_responses(rig, angle, [*held.values(), *neural], frequency)
     curves = {curve.oscillation.label: curve for curve in found}
     if progress is not None:
         progress(1.0)
+    biased, contracted = (tuple(curves[x] for x in some if x in held) for some in (alone, both))
+    neural_curve, amplitude = curves.get("neural"), relaxed * deflection
     return ExternalSinusoid(
-        joint=joint.name,
-        muscle=muscle,
-        angle=angle,
-        amplitude=relaxed * deflection,
-        bias=tuple(curves[label] for label in alone if label in held),
-        cocontraction=tuple(curves[label] for label in both if label in held),
-        neural=curves.get("neural"),
-        not_held=not_held,
+        joint.name, muscle, angle, amplitude, biased, contracted, neural_curve, not_held
     )
 
 
@@ -395,17 +388,17 @@ def _only(joint: Joint, muscle: str, excitation: float) -> Condition:
 
 
 def _oscillations(
-    joint: Joint, conditions: dict[str, tuple[float, Condition]], angle: float, torque: float
+    joint: Joint, conditions: dict[str, Condition], angle: float, torque: float
 ) -> tuple[dict[str, Oscillation], tuple[NotHeld, ...]]:
     """A torque oscillation for each condition in which the joint stays, and the others."""
     held, lost = {}, []
-    for label, (level, condition) in conditions.items():
+    for label, condition in conditions.items():
         try:
             excitations = stable_excitations(joint, condition, angle)
         except UnmeasuredError as error:
             lost.append(NotHeld(label, str(error)))
         else:
-            held[label] = Oscillation(label, level, excitations, torque)
+            held[label] = Oscillation(label, excitations, torque)
     if not held:
         raise UnmeasuredError("; ".join(one.reason for one in lost))
     return held, tuple(lost)
@@ -414,7 +407,7 @@ def _oscillations(
 def _neural(joint: Joint, held: Oscillation) -> Oscillation:
     """The same condition with oscillating excitations, first towards positive angles."""
     amplitudes = {m: _VARIATION * u * direction(joint, m) for m, u in held.excitations.items()}
-    return Oscillation("neural", held.level, held.excitations, amplitudes=amplitudes)
+    return Oscillation("neural", held.excitations, amplitudes=amplitudes)
 
 
 def _draw_column(column: Any, curves: Sequence[Curve], title: str) -> None:

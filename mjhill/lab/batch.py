@@ -17,6 +17,7 @@ from mjhill.lab.rig import UnmeasuredError
 from mjhill.muscles import steady_states
 
 CONTROL_AND_TORQUE = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+"""What a rollout reads for each step: the excitation of every muscle, then the joint's torque."""
 
 _Values = NDArray[np.float64]
 
