@@ -127,7 +127,7 @@ def test_ours_holds_its_own_posture_at_the_first_level_without_help(comparison: 
     assert abs(ours["elbow.applied"][0]) < 1e-3 * comparison.pair.max_load
 
 
-def test_co_contraction_stiffens_the_joint_through_the_series_element(
+def test_cocontraction_stiffens_the_joint_through_the_series_element(
     comparison: Comparison,
 ) -> None:
     found = {(row.task, row.quantity): row for row in comparison.rows}
@@ -155,8 +155,8 @@ def test_a_table_holds_in_json(comparison: Comparison) -> None:
     ("wrong", "message"),
     [
         ({"excitation": 0.0}, r"excitation must be in \(0, 1\], got 0.0"),
-        ({"co_contractions": (0.1, 1.5)}, r"co_contractions must be in \(0, 1\], got 1.5"),
-        ({"co_contractions": (0.1, 0.1)}, "two different"),
+        ({"cocontraction": (0.1, 1.5)}, r"cocontraction must be in \(0, 1\], got 1.5"),
+        ({"cocontraction": (0.1, 0.1)}, "two different"),
         ({"impulse": math.nan}, "impulse must be positive and finite"),
     ],
 )

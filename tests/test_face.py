@@ -9,6 +9,7 @@ import pytest
 from test_render import frames_of
 
 import mjhill
+from mjhill.comparison.report import views_of
 
 
 @pytest.fixture(scope="module")
@@ -86,5 +87,7 @@ def test_a_joint_is_identified_from_python(tmp_path):
 
 
 def test_muscles_are_compared_from_python():
-    result = mjhill.compare("wrist")
+    result = mjhill.compare("wrist", muscle="hill-rigid")
     assert result.rows
+    ours, native = views_of(result)  # what the film shows
+    assert (ours.model.na, native.model.na) == (4, 2)

@@ -41,7 +41,7 @@ def test_a_joint_is_accurate_at_its_default_timestep_and_holds_at_five_times_it(
 
 
 @pytest.mark.parametrize("name", list(mjhill.JOINTS))
-def test_full_co_contraction_does_not_ring_at_five_times_the_default_timestep(name):
+def test_full_cocontraction_does_not_ring_at_five_times_the_default_timestep(name):
     joint, model = mjhill.JOINTS[name], mjhill.load(name)
     excitation = dict.fromkeys(joint.muscles, 1.0)
     found = angles(model, joint, excitation, 5 * model.opt.timestep, 1.0)

@@ -65,7 +65,7 @@ def views_of(comparison: Comparison) -> list[View]:
     """The views of the video: the pulses with mjhill's muscles, then with MuJoCo's."""
     from mjhill.draw import View
 
-    spec = read_spec(comparison.model)
+    spec = read_spec(comparison.model, comparison.muscle)
     models = {"mjhill": compiled(spec), "native": compiled(native_spec(spec))}
     titles = {"mjhill": "mjhill", "native": "MuJoCo <muscle>"}
     return [

@@ -265,6 +265,7 @@ class Comparison:
         rows: The measures.
         recordings: By task, and then by ``mjhill`` or ``native``.
         cost: Time of a step; None if it was not measured.
+        muscle: The muscle model in the place of ``hill``; None if it stayed.
     """
 
     model: str
@@ -274,11 +275,13 @@ class Comparison:
     rows: tuple[Row, ...]
     recordings: Mapping[str, Mapping[str, Recording]]
     cost: StepCost | None = None
+    muscle: str | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Everything except the recordings, ready for JSON."""
         return {
             "model": self.model,
+            "muscle": self.muscle,
             "pair": asdict(self.pair),
             "tasks": dict(self.tasks),
             "matching": [asdict(match) for match in self.matching],
@@ -292,7 +295,7 @@ def compare(
     *,
     muscle: str | None = None,
     excitation: float = 0.5,
-    co_contractions: tuple[float, float] = (0.1, 0.5),
+    cocontraction: tuple[float, float] = (0.1, 0.5),
     impulse: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Comparison:
@@ -307,7 +310,7 @@ def compare(
         model: A joint's name, such as ``"elbow"``, or a path to an MJCF file with one joint.
         muscle: Name of the muscle model that takes the place of ``hill``, such as ``hill-rigid``.
         excitation: Excitation of the step, in (0, 1].
-        co_contractions: Two different excitations of both muscles, in (0, 1].
+        cocontraction: Two different excitations of both muscles, in (0, 1].
         impulse: Torque [N·m] or force [N] of the impulse; by default 15 % of the load at the
             agonist's maximum isometric force.
         progress: Called after each task with the share done, 0 to 1.
@@ -317,18 +320,18 @@ def compare(
             an antagonistic pair, or as ``native_model``.
         RuntimeError: MuJoCo warned of a bad state, or the joint does not come to rest.
     """
-    _check_arguments(excitation, co_contractions, impulse)
+    _check_arguments(excitation, cocontraction, impulse)
     spec = read_spec(model, muscle)
     models = {"mjhill": compiled(spec), "native": compiled(native_spec(spec))}
     pair = find_pair(models["mjhill"])
     load = _IMPULSE_SHARE * pair.max_load if impulse is None else impulse
     with installed():
-        posture = rest_position(models["mjhill"], co_contractions[0])
+        posture = rest_position(models["mjhill"], cocontraction[0])
         runs: dict[str, Callable[[mujoco.MjModel], Recording]] = {
             "step": partial(run_step, pair=pair, excitation=excitation),
             "pulses": partial(run_pulses, pair=pair),
         }
-        for each in co_contractions:
+        for each in cocontraction:
             runs[_impulse(each)] = partial(
                 run_impulse, pair=pair, excitation=each, position=posture, impulse=load
             )
@@ -337,14 +340,15 @@ def compare(
             recordings[task] = {side: run(models[side]) for side in models}
             if progress is not None:
                 progress((index + 1) / len(runs))
-    first = recordings[_impulse(co_contractions[0])]["mjhill"]
+    first = recordings[_impulse(cocontraction[0])]["mjhill"]
     return Comparison(
         str(model),
         pair,
-        _tasks(pair, first, excitation, co_contractions, load),
+        _tasks(pair, first, excitation, cocontraction, load),
         matching(model, muscle),
         tuple(_rows(pair, recordings, inertia(models["mjhill"], posture))),
         recordings,
+        muscle=muscle,
     )
 
 
@@ -360,14 +364,14 @@ def check(model: str | Path, muscle: str | None = None) -> None:
 
 
 def _check_arguments(
-    excitation: float, co_contractions: tuple[float, float], impulse: float | None
+    excitation: float, cocontraction: tuple[float, float], impulse: float | None
 ) -> None:
-    named = [("excitation", excitation), *(("co_contractions", each) for each in co_contractions)]
+    named = [("excitation", excitation), *(("cocontraction", each) for each in cocontraction)]
     for name, value in named:
         if not 0 < value <= 1:
             raise ValueError(f"{name} must be in (0, 1], got {value}")
-    if len({f"{each:g}" for each in co_contractions}) != 2:
-        raise ValueError(f"co_contractions must be two different ones, got {co_contractions}")
+    if len({f"{each:g}" for each in cocontraction}) != 2:
+        raise ValueError(f"cocontraction must be two different ones, got {cocontraction}")
     if impulse is not None and not (np.isfinite(impulse) and impulse > 0):
         raise ValueError(f"impulse must be positive and finite, got {impulse}")
 
@@ -376,7 +380,7 @@ def _tasks(
     pair: Pair,
     run: Recording,
     excitation: float,
-    co_contractions: tuple[float, float],
+    cocontraction: tuple[float, float],
     impulse: float,
 ) -> dict[str, str]:
     """A description of each task; ``run`` is one of the impulses."""
@@ -388,7 +392,7 @@ def _tasks(
         "step": f"{pair.agonist} at {excitation:g} from the home pose",
         "pulses": f"{pair.agonist} at 1 for {pulse}, then {pair.antagonist}, from the home pose",
     }
-    for each in co_contractions:
+    for each in cocontraction:
         words[_impulse(each)] = (
             f"{impulse:.3g} {load_unit} for {short} on the joint at rest at {where}, "
             f"both muscles at {each:g}"
@@ -396,8 +400,8 @@ def _tasks(
     return words
 
 
-def _impulse(co_contraction: float) -> str:
-    return f"impulse {co_contraction:g}"
+def _impulse(cocontraction: float) -> str:
+    return f"impulse {cocontraction:g}"
 
 
 def _rows(
