@@ -69,4 +69,4 @@ def test_run_says_in_one_line_what_no_muscle_can_do(tmp_path):
         "warning: muscle 'puller' did what no muscle can" for line in lines
     ]
     assert lines
-    assert check(path).exit_code == 3  # foretold
+    assert check(path).exit_code == 3  # predicted

@@ -26,7 +26,7 @@ def test_no_model_of_a_thousand_fails_in_silence(outcomes):
 def test_the_models_that_need_no_finding_are_many(outcomes):
     verdicts = [o.verdict for o in outcomes]
     assert verdicts.count("sound") > 0.4 * COUNT
-    assert verdicts.count("foretold") > 0.1 * COUNT
+    assert verdicts.count("predicted") > 0.1 * COUNT
     assert verdicts.count("plant") < 0.02 * COUNT
 
 

@@ -133,7 +133,7 @@ def table(outcomes: Sequence[Outcome]) -> Result:
     kinds = Counter(failure for o in outcomes for failure in o.failures)
     notes = (
         f"{STEPS} steps each; a failure: a warning of MuJoCo, a state that is not finite, n or a "
-        f"outside [0, 1], tension below 0 or above {STRONGEST:g} F_max; foretold: with a severe "
+        f"outside [0, 1], tension below 0 or above {STRONGEST:g} F_max; predicted: with a severe "
         "finding of check_model or check_tendons, or an error of a check",
         f"reported: mjhill.record warns or raises; because MuJoCo warned: {len(warned)} of them",
         "plant: MuJoCo also warns of the same run without mjhill's muscles and elasticities",
@@ -147,7 +147,7 @@ def table(outcomes: Sequence[Outcome]) -> Result:
 def _row(kind: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
     verdicts = Counter(outcome.verdict for outcome in outcomes)
     row: dict[str, Any] = {"models": kind, "n": len(outcomes)}
-    for verdict in ("sound", "finding only", "foretold", "reported", "plant", "silent"):
+    for verdict in ("sound", "finding only", "predicted", "reported", "plant", "silent"):
         row[verdict] = verdicts[verdict]
     return row
 

@@ -90,11 +90,11 @@ class Outcome:
 
     @property
     def verdict(self) -> str:
-        """One of: sound, foretold, finding only (no failure), plant, reported, silent."""
+        """One of: sound, predicted, finding only (no failure), plant, reported, silent."""
         if not self.failures:
             return "finding only" if self.findings else "sound"
         if self.findings:
-            return "foretold"
+            return "predicted"
         if self.plant:
             return "plant"
         return "reported" if self.reported else "silent"
