@@ -14,9 +14,11 @@ import mujoco
 import mujoco.batch
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from made_models import CASCADE, RUN
 
 import mjhill
+from mjhill.cli import main
 from mjhill.engine.equations import compiled_functions, globals_of, source_digest, with_callees
 from mjhill.engine.layout import addresses, muscle_ids
 from mjhill.engine.spec import joint_spec
@@ -375,3 +377,34 @@ def test_a_new_model_is_a_file_and_a_line(tmp_path):
 def test_equations_of_scalar_models_take_and_give_plain_floats():
     for model in mjhill.MODELS:
         assert not {"states", "state_rates"} & set(arguments(model.rates))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_model_is_filmed(name):
+    model = mjhill.load("elbow", muscle=name)
+    with mjhill.installed():
+        run = mjhill.record(model, mjhill.at_home(model), duration=0.2, excitation=MOVEMENT)
+    first, *_, last = mjhill.frames(mjhill.View(model, run), fps=10, size=(320, 180))
+    assert (first != last).any()
+
+
+def command(*arguments):
+    return CliRunner().invoke(main, arguments)
+
+
+def test_commands_take_a_muscle_model(tmp_path):
+    shown = command("info", "elbow", "--muscle", "hill-rigid", "--json")
+    assert shown.exit_code == 0, shown.output
+    parameters = {row["parameter"] for row in json.loads(shown.stdout)}
+    assert "hill_shape" in parameters
+    assert "series_stretch" not in parameters
+    xml = command("info", "elbow", "--muscle", "hill-rigid", "--mjcf").stdout
+    assert 'actdim="2"' in xml
+    path = tmp_path / "run.csv"
+    ran = command("run", "elbow", "--muscle", "hill-rigid", "-d", "0.1", "-o", str(path))
+    assert ran.exit_code == 0, ran.output
+    assert "elbow_flexor.stretch" not in mjhill.Recording.load(path).series
+    for name in ("run", "video", "compare", "info"):
+        refused = command(name, "elbow", "--muscle", "hil")
+        assert refused.exit_code == 2
+        assert "unknown muscle model 'hil'; there are: hill, hill-rigid" in refused.stderr
