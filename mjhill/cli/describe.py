@@ -84,7 +84,7 @@ def _angle_rows(joint: Joint) -> Iterator[dict[str, Any]]:
 
 def _part_rows(name: str, part: Any, hinge: bool) -> Iterator[dict[str, Any]]:
     for parameter, quantity in quantities(type(part)):
-        # a part read from a file states no sources, one of ours states all but defaults
+        # a part read from a file states no sources; a shipped joint states all but defaults
         source = part.sources.get(parameter, "default" if part.sources else "")
         yield {
             "of": name,

@@ -43,7 +43,7 @@ _HIDDEN_GROUP = 5  # MuJoCo's default visualisation leaves groups 3 to 5 out
 
 @dataclass(frozen=True)
 class DrawnMuscle:
-    """What it takes to draw a muscle.
+    """What is needed to draw a muscle.
 
     Attributes:
         name: The actuator's name.
@@ -82,7 +82,7 @@ class Shape:
 
 
 def drawn_muscles(model: mujoco.MjModel, recording: Recording | None) -> tuple[DrawnMuscle, ...]:
-    """The muscles of a model, ours and MuJoCo's, that the recording has activation and force of.
+    """The muscles of a model, mjhill's and MuJoCo's, whose activation and force are recorded.
 
     A muscle is drawn along the tendon of its name, or else along the tendon it acts on.
     """
@@ -277,7 +277,7 @@ def _belly(branch: Points, rest: float, radius: float) -> list[Shape]:
 
 
 def _add_shape(scene: Any, shape: Shape, rgb: Any, emission: float) -> None:
-    """Put a shape into a scene; one that is full takes no more."""
+    """Put a shape into a scene, unless that is full."""
     if scene.ngeom >= scene.maxgeom:
         return
     geom = scene.geoms[scene.ngeom]

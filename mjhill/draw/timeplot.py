@@ -54,7 +54,7 @@ class Plot:
 
 
 def make_plots(recording: Recording, muscles: Sequence[DrawnMuscle]) -> tuple[Plot, ...]:
-    """Angle of each joint, activation and force of each muscle; what there is of these."""
+    """Angle of each joint, activation and force of each muscle, as far as recorded."""
     time = recording.time
 
     def curves(names: Iterable[tuple[str, str, Colour]], factor: float = 1.0) -> tuple[Curve, ...]:
@@ -209,7 +209,7 @@ def _text(
 
 
 def _draw_texts(figure: Any, size: tuple[int, int], side: Side) -> None:
-    """Title and legend: whatever neither moves nor changes."""
+    """Title and legend, which never change."""
     from matplotlib.patches import Rectangle
 
     width, height = size

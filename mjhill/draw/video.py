@@ -60,7 +60,7 @@ def video_writer(
 
 
 def _checked(process: Any, action: Callable[..., None], *frame: Any) -> None:
-    """Do something with the encoder, and if it is dead say why.
+    """Use the encoder; if it has ended, say why.
 
     Raises:
         RuntimeError: It is.

@@ -95,7 +95,7 @@ class Player:
     Attributes:
         model: The model.
         data: Its state.
-        running: Whether time goes on.
+        running: Whether the simulation runs.
         speed: Simulated time by wall time [-].
         problem: The warning of MuJoCo that has ended the run, or nothing.
     """
@@ -236,7 +236,7 @@ def _aim(camera: Any, model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 def _check_display() -> None:
-    """Open a window that is not shown: MuJoCo's viewer waits for ever where none can be had.
+    """Open a window that is not shown: MuJoCo's viewer waits forever where it gets none.
 
     Raises:
         RuntimeError: It could not be opened; the message says why.

@@ -239,7 +239,7 @@ _EXPLANATIONS = {
 does not state and the fit finds. MAG, T1 and T2 are those of the overdamped second-order response
 nearest to the simulated one. T1 and T2 singly say little where they are nearly equal or the
 response swings, marked ill-conditioned: their sum is what counts. Published T1 and T2 are
-corrected where the note says so; a row without a direction stands for both.""",
+corrected where the note says so; a row without a direction holds for both.""",
     "Passive torques and ranges of motion": """Low and high span what is published, the fit's data
 beside Table 2. Where the two contradict each other, as where Table 2 wants a joint to go further
 than its range, the fit is in between and `outside by` says by how much it misses.""",

@@ -72,7 +72,7 @@ def record(
         ValueError: A name is unknown or would be that of two series, an input is not finite, a
             number is out of range, or the model is not in order; see ``check_model``.
         RuntimeError: Callbacks are not installed though the model has muscles, or MuJoCo
-            warned: it resets a bad state and goes on, so the rest would be meaningless.
+            warned: it resets a bad state and continues, so the rest would be meaningless.
 
     Warns:
         RuntimeWarning: A muscle did something impossible; see ``transients``.
@@ -169,7 +169,7 @@ def _scalar_joints(model: mujoco.MjModel) -> list[str]:
 
 
 def check_warnings(data: mujoco.MjData) -> None:
-    """Refuse data in which MuJoCo warned: it resets a bad state and goes on.
+    """Refuse data in which MuJoCo warned: it resets a bad state and continues.
 
     Raises:
         RuntimeError: A warning was counted; the message has its name and the time.
