@@ -143,7 +143,7 @@ def _expand(batch: mujoco.batch.Batch, joints: Sequence[Joint]) -> None:
 
 
 def check_batch(batch: mujoco.batch.Batch, joint: Joint) -> None:
-    """Refuse a batch in which MuJoCo warned: such a simulation stops, or continues from a reset state.
+    """Refuse a batch in which MuJoCo warned: it stops there, or continues from a reset state.
 
     Raises:
         UnmeasuredError: A simulation warned; the message has the warning's name and the joint.
