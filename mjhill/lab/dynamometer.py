@@ -149,7 +149,7 @@ def run_paths(
         np.asarray(setup.timestep * np.arange(steps), dtype=np.float64),
         angle,
         machine.damping * rise - force,
-        {name: act[:, :, address.act + 1] for name, address in addresses(model)},
+        {name: act[:, :, at.state(at.model.activation)] for name, at in addresses(model)},
     )
 
 
