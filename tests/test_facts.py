@@ -14,7 +14,7 @@ from mjhill.identification import facts as measured
 from mjhill.identification.facts import Fact, facts
 from mjhill.lab.ballistic import ballistic_movement, free_velocity
 from mjhill.lab.impedance import held_impedance, passive_stiffness, stiffness_slope
-from mjhill.lab.postures import holding_excitations
+from mjhill.lab.postures import tonic_excitations
 from mjhill.lab.rig import (
     UnmeasuredError,
     angle_series,
@@ -67,7 +67,7 @@ def test_a_search_sees_the_angles_of_the_recorded_run_bit_for_bit():
 @pytest.mark.parametrize("angle", [-0.5, 0.0, 0.5])
 def test_a_joint_stays_where_it_is_held(angle):
     joint = make_joint()
-    bench, levels = build_rig(joint), holding_excitations(joint, "puller", angle)
+    bench, levels = build_rig(joint), tonic_excitations(joint, "puller", angle)
     end = record_run(bench, at_rest(bench, angle, levels), 0.5, excitation=levels)["joint.angle"][
         -1
     ]
@@ -76,7 +76,7 @@ def test_a_joint_stays_where_it_is_held(angle):
 
 def test_a_joint_too_stiff_for_its_muscle_is_not_held():
     with pytest.raises(UnmeasuredError, match="full excitation of puller does not hold joint"):
-        holding_excitations(make_joint(stiffness=100.0), "puller", 0.5)
+        tonic_excitations(make_joint(stiffness=100.0), "puller", 0.5)
 
 
 # --- ballistic movements

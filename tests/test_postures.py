@@ -11,10 +11,10 @@ from mjhill.lab.postures import (
     balancing_excitations,
     check_ascending,
     held_cocontractions,
-    holding_excitations,
     stable_excitations,
     stablest_angle,
     static_stiffness,
+    tonic_excitations,
 )
 from mjhill.lab.rig import UnmeasuredError, angle_series, at_rest, build_rig, net_torque
 
@@ -102,14 +102,14 @@ def test_levels_that_are_not_held_come_with_their_reason():
 @pytest.mark.parametrize("angle", [0.1, 2.2])
 def test_one_muscle_holds_a_joint_and_too_far_none_does(angle):
     elbow = mjhill.JOINTS["elbow"]
-    inputs = holding_excitations(elbow, "elbow_flexor", angle)
+    inputs = tonic_excitations(elbow, "elbow_flexor", angle)
     assert abs(net_torque(elbow, inputs, angle)) < 1e-9
     assert sum(level > 0 for level in inputs.values()) == 1
     weak = {
         name: replace(muscle, max_isometric_force=1e-6) for name, muscle in elbow.muscles.items()
     }
     with pytest.raises(UnmeasuredError, match=r"full excitation of .* does not hold elbow at .*°"):
-        holding_excitations(replace(elbow, muscles=weak), "elbow_flexor", angle)
+        tonic_excitations(replace(elbow, muscles=weak), "elbow_flexor", angle)
 
 
 @pytest.mark.parametrize("values", [(), (0.1,), (0.2, 0.1), (0.1, 0.1), (0.0, 0.1), (0.5, 1.1)])

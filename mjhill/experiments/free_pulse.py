@@ -20,7 +20,7 @@ from mjhill.draw.bellies import MUSCLE_COLOURS
 from mjhill.experiments.result import Claim, Measure, Result
 from mjhill.joints.joint import Joint
 from mjhill.lab.batch import joint_angles
-from mjhill.lab.postures import holding_excitations, resting_angle
+from mjhill.lab.postures import resting_angle, tonic_excitations
 from mjhill.lab.rig import (
     UnmeasuredError,
     antagonist,
@@ -415,7 +415,7 @@ def _three_bursts(joint: Joint, muscle: str, width: float, travel: float) -> Rec
     end = joint.range[1] if sign > 0 else joint.range[0]
     target = joint.rest_angle + sign * min(_GOAL * travel, _INSIDE * abs(end - joint.rest_angle))
     try:
-        hold = holding_excitations(joint, muscle, target)
+        hold = tonic_excitations(joint, muscle, target)
     except UnmeasuredError:  # the joint then drifts back
         hold = dict.fromkeys(joint.muscles, 0.0)
     steps = round(_END * width / rig.timestep)

@@ -34,7 +34,9 @@ from mjhill.literature.facts import read_entries
 from mjhill.simulate.recording import Recording
 from mjhill.simulate.signals import Signal, pulse
 
-_PULSE = 2e-3  # [s]; the neural impulse of sect. 4.1.1
+# [s]; an excitation of 1 is the largest firing rate (sect. 4.1.2), so one action potential has the
+# area of one over that rate: 60 Hz, at which plantarflexors fuse (Sale et al. 1982)
+ACTION_POTENTIAL = 1 / 60
 _TWITCH_TIME = 1.0  # length of a run [s]
 _TETANUS_TIME = 1.5  # [s]
 _OVER = 0.05  # share of its peak that is left of a twitch that is over, at most
@@ -52,7 +54,7 @@ class MuscleTwitch:
 
     Attributes:
         angle: The joint angle [rad].
-        contraction: Time from the start of the impulse to the peak of torque [s].
+        contraction: Time from the middle of the impulse to the peak of torque [s].
         half_relaxation: Time from the peak until torque is half of it [s].
         peak: Largest torque above that at rest [N·m].
         share: Peak, as a share of the largest torque under lasting full excitation [-].
@@ -69,9 +71,10 @@ class MuscleTwitch:
     recording: Recording
 
 
-def muscle_twitch(joint: Joint, muscle: str, *, width: float = _PULSE) -> MuscleTwitch:
+def muscle_twitch(joint: Joint, muscle: str, *, width: float = ACTION_POTENTIAL) -> MuscleTwitch:
     """The twitch of a muscle after full excitation for ``width`` [s], on a dynamometer.
 
+    By default the excitation is that of one action potential.
     The gauge reads 0 at rest, so that passive torque does not count.
 
     Raises:
@@ -94,7 +97,8 @@ def muscle_twitch(joint: Joint, muscle: str, *, width: float = _PULSE) -> Muscle
     top = int(torque.argmax())
     peak = float(torque[top])
     share = peak / float(tetanus.max())
-    return MuscleTwitch(angle, float(recording.time[top]), half, peak, share, torque, recording)
+    contraction = float(recording.time[top]) - 0.5 * width
+    return MuscleTwitch(angle, contraction, half, peak, share, torque, recording)
 
 
 @dataclass(frozen=True)
@@ -204,7 +208,7 @@ class Twitch(Result):
                 scaled.plot(time, torque / found.peak, color=colour, ls=style)
         handles.append(Line2D([], [], color="0.4", ls="--", label="electrical stimulation"))
         absolute.set_ylabel(f"torque above rest [{unit}]")
-        absolute.set_title(f"impulse of {1e3 * self.width:g} ms", fontsize=11)
+        absolute.set_title(f"impulse of {1e3 * self.width:.3g} ms", fontsize=11)
         scaled.set_ylabel("torque, of its peak [-]")
         scaled.set_title("time course", fontsize=11)
         for axes in (absolute, scaled):
@@ -226,7 +230,7 @@ class Twitch(Result):
 def twitch(
     joint: str | Joint = "ankle",
     *,
-    width: float = _PULSE,
+    width: float = ACTION_POTENTIAL,
     progress: Callable[[float], None] | None = None,
 ) -> Twitch:
     """The isometric twitch of each muscle of a joint, each at the angle of its largest force.

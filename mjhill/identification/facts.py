@@ -9,11 +9,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import radians
 from types import MappingProxyType
+from typing import Any
 
 from mjhill.experiments.twitch import muscle_twitch
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import JOINTS
-from mjhill.lab.ballistic import BallisticMovement, ballistic_movement, free_velocity
+from mjhill.lab.ballistic import (
+    BallisticMovement,
+    ballistic_movement,
+    free_velocity,
+    velocity_intercept,
+)
 from mjhill.lab.impedance import held_impedance, passive_stiffness, stiffness_slope
 from mjhill.lab.rig import UnmeasuredError
 from mjhill.literature.facts import PER_SI, Entry, name_of, read_entries
@@ -51,29 +57,19 @@ class Fact:
         return None if self.measured is None else self.low <= self.measured <= self.high
 
 
-def _ballistic(
-    joint: Joint, muscle: str, degrees: float, time: float, braked: bool
-) -> BallisticMovement:
-    amplitude = radians(degrees)
-    return ballistic_movement(joint, muscle, amplitude=amplitude, duration=time, braked=braked)
+def _ballistic(joint: Joint, muscle: str, degrees: float, **options: Any) -> BallisticMovement:
+    duration = options.pop("time")
+    return ballistic_movement(
+        joint, muscle, amplitude=radians(degrees), duration=duration, **options
+    )
 
 
-def _ballistic_peak_velocity(
-    joint: Joint, muscle: str, *, degrees: float, time: float, braked: bool = False
-) -> float:
-    return _ballistic(joint, muscle, degrees, time, braked).peak_velocity
+def _ballistic_peak_velocity(joint: Joint, muscle: str, **options: Any) -> float:
+    return _ballistic(joint, muscle, **options).peak_velocity
 
 
-def _ballistic_duration(
-    joint: Joint,
-    muscle: str,
-    *,
-    degrees: float,
-    time: float,
-    threshold: float,
-    braked: bool = False,
-) -> float:
-    return _ballistic(joint, muscle, degrees, time, braked).duration(radians(threshold))
+def _ballistic_duration(joint: Joint, muscle: str, *, threshold: float, **options: Any) -> float:
+    return _ballistic(joint, muscle, **options).duration(radians(threshold))
 
 
 def _twitch_contraction(joint: Joint, muscle: str) -> float:
@@ -86,6 +82,10 @@ def _twitch_half_relaxation(joint: Joint, muscle: str) -> float:
 
 def _twitch_share(joint: Joint, muscle: str) -> float:
     return muscle_twitch(joint, muscle).share
+
+
+def _free_velocity(joint: Joint, muscle: str, *, degrees: float | None = None) -> float:
+    return free_velocity(joint, muscle, angle=None if degrees is None else radians(degrees))
 
 
 def _passive_stiffness(joint: Joint, _: str, *, degrees: float) -> float:
@@ -113,7 +113,8 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
         "twitch_contraction": _twitch_contraction,
         "twitch_half_relaxation": _twitch_half_relaxation,
         "twitch_share": _twitch_share,
-        "free_velocity": free_velocity,
+        "free_velocity": _free_velocity,
+        "velocity_intercept": velocity_intercept,
         "passive_stiffness": _passive_stiffness,
         "held_stiffness": _held_stiffness,
         "held_damping_ratio": _held_damping_ratio,

@@ -1,4 +1,4 @@
-"""Fast movements: the fastest ballistic movement to a new angle, and the free velocity.
+"""Fast movements: the fastest ballistic movement to a new angle, and largest velocities.
 
 The excitation of a fast voluntary movement is near a pulse of maximal height, 30 to 200 ms long,
 and bursts that clamp the joint at its new angle (Winters & Stark 1987, sect. 4.2.1); a saccade is
@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 
 from mjhill.analysis.responses import time_to
 from mjhill.joints.joint import Joint
-from mjhill.lab.postures import holding_excitations
+from mjhill.lab.postures import tonic_excitations
 from mjhill.lab.rig import (
     Rig,
     UnmeasuredError,
@@ -38,6 +38,7 @@ from mjhill.simulate.signals import Signal
 
 _FALL_BACK = 0.05  # of the amplitude: a braked movement comes back by no more after its peak
 _FREE_TIME = 1.0  # [s]; the slowest joint has crossed its range by then
+_RECOIL = 0.5  # of a free velocity, from which passive elasticity is too much of it
 _PULSE_ERROR, _SEARCH_ERROR = 1e-6, 2e-4  # of a pulse's width [s]
 
 
@@ -91,6 +92,7 @@ class _Task:
     amplitude: float
     duration: float
     hold: dict[str, float]
+    height: float
 
     def excitations(self, pulse: float, brake: float) -> dict[str, Signal]:
         """Excitation of each muscle; within a step, the mean of a pulse that ends there."""
@@ -100,11 +102,14 @@ class _Task:
             return min(max((end - time) / step + 0.5, 0.0), 1.0)
 
         def on(time: float) -> float:
-            return share(time, pulse) + (1.0 - share(time, pulse + brake)) * hold[self.agonist]
+            held = (1.0 - share(time, pulse + brake)) * hold[self.agonist]
+            return self.height * share(time, pulse) + held
 
         def braking(time: float) -> float:
             ended = share(time, pulse + brake)
-            return ended - share(time, pulse) + (1.0 - ended) * hold[self.antagonist]
+            return (
+                self.height * (ended - share(time, pulse)) + (1.0 - ended) * hold[self.antagonist]
+            )
 
         ends = (pulse, pulse + brake)
         return {self.agonist: Signal(on, ends), self.antagonist: Signal(braking, ends)}
@@ -130,9 +135,16 @@ class _Task:
 
 
 def ballistic_movement(
-    joint: Joint, muscle: str, *, amplitude: float, duration: float, braked: bool = False
+    joint: Joint,
+    muscle: str,
+    *,
+    amplitude: float,
+    duration: float,
+    braked: bool = False,
+    height: float = 1.0,
+    tonic: float = 0.0,
 ) -> BallisticMovement:
-    """The fastest movement by ``amplitude`` [rad] that ``muscle`` makes.
+    """The fastest movement by ``amplitude`` [rad] that ``muscle`` makes with pulses of a height.
 
     Without a brake, the pulse is just wide enough to reach the new angle and not pass it. With a
     brake, the pulse is the widest for which the brake stops the joint at the new angle and the
@@ -144,26 +156,28 @@ def ballistic_movement(
         amplitude: How far the joint moves [rad].
         duration: Length of the run, within which it must arrive [s].
         braked: Whether the antagonist brakes.
+        height: Excitation in pulse and brake [-].
+        tonic: Least excitation of both muscles before and after the movement [-].
 
     Raises:
         UnmeasuredError: The joint cannot make such a movement.
     """
     rig = build_rig(joint)
     first, last = _ends(joint, muscle, amplitude)
-    start = at_rest(rig, first, holding_excitations(joint, muscle, first))
-    hold = holding_excitations(joint, muscle, last)
+    start = at_rest(rig, first, tonic_excitations(joint, muscle, first, tonic))
+    hold = tonic_excitations(joint, muscle, last, tonic)
     other = antagonist(joint, muscle)
-    task = _Task(rig, muscle, other, start, amplitude, duration, hold)
+    task = _Task(rig, muscle, other, start, amplitude, duration, hold, height)
     if task.excess(duration, 0.0) < 0:
         raise UnmeasuredError(
-            f"full excitation does not move it by {degrees(amplitude):g}° in {duration:g} s"
+            f"an excitation of {height:g} does not move it by {degrees(amplitude):g}° in "
+            f"{duration:g} s"
         )
     pulse, brake = _braked(task) if braked else (_unbraked(task), 0.0)
     recording = record_run(rig, start, duration, excitation=task.excitations(pulse, brake))
     velocity = direction(joint, muscle) * recording[f"{joint.name}.velocity"]
-    return BallisticMovement(
-        pulse, brake, velocity, task.progress(recording[f"{joint.name}.angle"]), recording
-    )
+    progress = task.progress(recording[f"{joint.name}.angle"])
+    return BallisticMovement(pulse, brake, velocity, progress, recording)
 
 
 def _ends(joint: Joint, muscle: str, amplitude: float) -> tuple[float, float]:
@@ -212,21 +226,44 @@ def _root(function: Callable[[float], float], low: float, high: float, error: fl
     return float(brentq(known, low, high, xtol=error))
 
 
-def free_velocity(joint: Joint, muscle: str) -> float:
-    """Peak velocity [rad/s] at full excitation, from the far end of the range of motion.
+def free_velocity(joint: Joint, muscle: str, *, angle: float | None = None) -> float:
+    """Peak velocity [rad/s] at full excitation of a joint that carries no load.
 
-    The joint starts still, both muscles relaxed. Past the other end, where ligaments and bone
-    would stop it, its velocity does not count.
+    The joint starts still, both muscles relaxed. Past the end of the range, where ligaments and
+    bone would stop it, its velocity does not count.
+
+    Args:
+        joint: The joint.
+        muscle: The muscle.
+        angle: Where the joint starts [rad]; by default at its angle of rest.
 
     Raises:
-        UnmeasuredError: The muscle does not move it.
+        UnmeasuredError: The muscle does not move the joint, or the passive elasticity alone moves
+            it from there at more than half of that velocity.
     """
-    along, (low, high) = direction(joint, muscle), joint.range
-    rig = build_rig(joint)
-    start = at_rest(rig, low if along > 0 else high)
-    recording = record_run(rig, start, _FREE_TIME, excitation={muscle: 1.0})
-    angle, velocity = recording[f"{joint.name}.angle"], along * recording[f"{joint.name}.velocity"]
-    peak = float(velocity[(angle >= low) & (angle <= high)].max())
-    if peak <= 0:
-        raise UnmeasuredError(f"{muscle} does not move it from the far end of its range")
-    return peak
+    start = joint.rest_angle if angle is None else angle
+    relaxed, full = (_peak_velocity(joint, muscle, start, u) for u in (0.0, 1.0))
+    if full <= 0:
+        raise UnmeasuredError(f"{muscle} does not move it from {degrees(start):.3g}°")
+    if relaxed > _RECOIL * full:
+        raise UnmeasuredError(
+            f"from {degrees(start):.3g}° its elasticity alone moves it at {relaxed:.3g} rad/s, and "
+            f"{muscle} at {full:.3g} rad/s"
+        )
+    return full
+
+
+def _peak_velocity(joint: Joint, muscle: str, start: float, excitation: float) -> float:
+    """Peak velocity [rad/s] in a muscle's direction inside the range of motion."""
+    along, (low, high), rig = direction(joint, muscle), joint.range, build_rig(joint)
+    run = record_run(rig, at_rest(rig, start), _FREE_TIME, excitation={muscle: excitation})
+    angle, velocity = run[f"{joint.name}.angle"], along * run[f"{joint.name}.velocity"]
+    return float(velocity[(angle >= low) & (angle <= high)].max(initial=0.0))
+
+
+def velocity_intercept(joint: Joint, muscle: str) -> float:
+    """Velocity [rad/s] at which Hill's relation of a muscle carries no load, fully active.
+
+    What torque-velocity curves measured under loads are extrapolated to.
+    """
+    return joint.hill_muscles[muscle].max_velocity / abs(joint.gears[muscle])

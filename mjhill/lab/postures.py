@@ -86,24 +86,28 @@ def balancing_excitations(joint: Joint, cocontraction: float, angle: float) -> d
     return excitations(float(share), weaker)
 
 
-def holding_excitations(joint: Joint, agonist: str, angle: float) -> dict[str, float]:
-    """Smallest excitations that hold a joint at an angle [rad]: at most one muscle is active.
+def tonic_excitations(
+    joint: Joint, agonist: str, angle: float, tonic: float = 0.0
+) -> dict[str, float]:
+    """Smallest excitations of an agonist and its antagonist that hold a joint at an angle [rad].
+
+    Neither is below ``tonic`` [-], and only one above; other muscles are off.
 
     Raises:
         UnmeasuredError: Full excitation does not hold the joint there.
     """
-    relaxed = dict.fromkeys(joint.muscles, 0.0)
-    rest = net_torque(joint, relaxed, angle)
+    other = antagonist(joint, agonist)
+    both = {**dict.fromkeys(joint.muscles, 0.0), agonist: tonic, other: tonic}
+    rest = net_torque(joint, both, angle)
     if rest == 0:
-        return relaxed
-    needs_agonist = rest * direction(joint, agonist) < 0
-    holder = agonist if needs_agonist else antagonist(joint, agonist)
-    if rest * net_torque(joint, {holder: 1.0}, angle) > 0:
+        return both
+    holder = agonist if rest * direction(joint, agonist) < 0 else other
+    if rest * net_torque(joint, {**both, holder: 1.0}, angle) > 0:
         raise UnmeasuredError(
             f"full excitation of {holder} does not hold {joint.name} at {degrees(angle):.3g}°"
         )
-    root = brentq(lambda u: net_torque(joint, {holder: u}, angle), 0.0, 1.0, xtol=1e-12)
-    return {**relaxed, holder: float(root)}
+    root = brentq(lambda u: net_torque(joint, {**both, holder: u}, angle), tonic, 1.0, xtol=1e-12)
+    return {**both, holder: float(root)}
 
 
 def stable_excitations(

@@ -22,6 +22,7 @@ MEASURES = (  # that an entry can name
     "twitch_half_relaxation",
     "twitch_share",
     "free_velocity",
+    "velocity_intercept",
     "passive_stiffness",
     "held_stiffness",
     "held_damping_ratio",
