@@ -1,30 +1,15 @@
-"""Published facts about human joints, as published and as measured in simulation.
-
-Every measure takes the joint and the muscle concerned, then its own arguments, and returns SI.
-"""
+"""Published facts about human joints, as published and as measured in simulation."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import radians
-from types import MappingProxyType
-from typing import Any
 
-from mjhill.experiments.twitch import muscle_twitch
+from mjhill.identification.measures import measure
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import JOINTS
-from mjhill.lab.ballistic import (
-    BallisticMovement,
-    ballistic_movement,
-    free_velocity,
-    velocity_intercept,
-)
-from mjhill.lab.impedance import held_impedance, passive_stiffness, stiffness_slope
 from mjhill.lab.rig import UnmeasuredError
-from mjhill.literature.facts import PER_SI, Entry, name_of, read_entries
-
-Measure = Callable[..., float]
+from mjhill.literature.facts import Entry, name_of, read_entries
 
 
 @dataclass(frozen=True)
@@ -55,72 +40,6 @@ class Fact:
     def within(self) -> bool | None:
         """Whether the joint is inside the interval; None where it could not be measured."""
         return None if self.measured is None else self.low <= self.measured <= self.high
-
-
-def _ballistic(joint: Joint, muscle: str, degrees: float, **options: Any) -> BallisticMovement:
-    duration = options.pop("time")
-    return ballistic_movement(
-        joint, muscle, amplitude=radians(degrees), duration=duration, **options
-    )
-
-
-def _ballistic_peak_velocity(joint: Joint, muscle: str, **options: Any) -> float:
-    return _ballistic(joint, muscle, **options).peak_velocity
-
-
-def _ballistic_duration(joint: Joint, muscle: str, *, threshold: float, **options: Any) -> float:
-    return _ballistic(joint, muscle, **options).duration(radians(threshold))
-
-
-def _twitch_contraction(joint: Joint, muscle: str) -> float:
-    return muscle_twitch(joint, muscle).contraction
-
-
-def _twitch_half_relaxation(joint: Joint, muscle: str) -> float:
-    return muscle_twitch(joint, muscle).half_relaxation
-
-
-def _twitch_share(joint: Joint, muscle: str) -> float:
-    return muscle_twitch(joint, muscle).share
-
-
-def _free_velocity(joint: Joint, muscle: str, *, degrees: float | None = None) -> float:
-    return free_velocity(joint, muscle, angle=None if degrees is None else radians(degrees))
-
-
-def _passive_stiffness(joint: Joint, _: str, *, degrees: float) -> float:
-    return passive_stiffness(joint, radians(degrees))
-
-
-def _held_stiffness(joint: Joint, muscle: str, *, share: float, degrees: float) -> float:
-    return held_impedance(joint, muscle, share=share, angle=radians(degrees)).stiffness
-
-
-def _held_damping_ratio(joint: Joint, muscle: str, *, share: float, degrees: float) -> float:
-    return held_impedance(joint, muscle, share=share, angle=radians(degrees)).damping_ratio
-
-
-def _stiffness_slope(
-    joint: Joint, muscle: str, *, shares: Sequence[float], degrees: float
-) -> float:
-    return stiffness_slope(joint, muscle, shares=shares, angle=radians(degrees))
-
-
-MEASURES: Mapping[str, Measure] = MappingProxyType(
-    {
-        "ballistic_peak_velocity": _ballistic_peak_velocity,
-        "ballistic_duration": _ballistic_duration,
-        "twitch_contraction": _twitch_contraction,
-        "twitch_half_relaxation": _twitch_half_relaxation,
-        "twitch_share": _twitch_share,
-        "free_velocity": _free_velocity,
-        "velocity_intercept": velocity_intercept,
-        "passive_stiffness": _passive_stiffness,
-        "held_stiffness": _held_stiffness,
-        "held_damping_ratio": _held_damping_ratio,
-        "stiffness_slope": _stiffness_slope,
-    }
-)
 
 
 def facts(
@@ -164,8 +83,7 @@ def _check_muscle(entry: Entry, joint: Joint) -> None:
 def _fact(entry: Entry, joint: Joint) -> Fact:
     measured, note = None, ""
     try:
-        value = MEASURES[entry.measure](joint, entry.muscle, **entry.arguments)
-        measured = PER_SI[entry.unit] * value
+        measured = float(measure(entry, [joint])[0])
     except UnmeasuredError as reason:
         note = str(reason)
     return Fact(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp, log
 from pathlib import Path
@@ -30,11 +30,13 @@ class Free:
             ``("muscles", "elbow_flexor", "max_velocity")``.
         low: Lower bound, in the parameter's unit.
         high: Upper bound.
+        mirrors: Paths of parameters that have the same value, and 1, or -1 for the opposite one.
     """
 
     path: tuple[str, ...]
     low: float
     high: float
+    mirrors: tuple[tuple[tuple[str, ...], float], ...] = ()
 
     @property
     def name(self) -> str:
@@ -76,6 +78,8 @@ def free_parameters(joint: str, path: str | Path | None = None) -> list[Free]:
         raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(known)}")
     tables = tomllib.loads(Path(path or parameter_file()).read_text(encoding="utf-8"))
     found = list(_entries(tables[joint], ()))
+    if tables[joint].get("symmetric"):
+        found = list(_tied(found, list(known[joint].muscles)))
     for free, value in found:
         if free.path[-1] in _NOT_FITTED:
             raise ValueError(f"{joint}: {free.name} cannot be fitted; remove its bounds")
@@ -100,11 +104,31 @@ def _entries(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[tuple[
             yield from _entries(entry, (*path, name))
 
 
+def _tied(
+    entries: Iterable[tuple[Free, float]], muscles: Sequence[str]
+) -> Iterator[tuple[Free, float]]:
+    """The parameters of a symmetric joint: those of its first muscle and positive side."""
+    first, second = muscles
+    for free, value in entries:
+        name = free.path[-1]
+        if second in free.path or name.endswith("_neg"):
+            continue
+        if first in free.path:
+            other = tuple(second if key == first else key for key in free.path)
+            yield replace(free, mirrors=((other, -1.0 if "postures" in other else 1.0),)), value
+        elif name.endswith("_pos"):
+            other = (*free.path[:-1], name.replace("_pos", "_neg"))
+            yield replace(free, mirrors=((other, 1.0),)), value
+        else:
+            yield free, value
+
+
 def joint_at(joint: Joint, free: Sequence[Free], deviations: NDArray[np.float64]) -> Joint:
     """A joint with its free parameters at some deviations, shape (P,), from their middles."""
-    values: dict[tuple[str, ...], float] = {
-        item.path: item.value(z) for item, z in zip(free, deviations.tolist(), strict=True)
-    }
+    values: dict[tuple[str, ...], float] = {}
+    for item, z in zip(free, deviations.tolist(), strict=True):
+        values[item.path] = item.value(z)
+        values |= {path: sign * values[item.path] for path, sign in item.mirrors}
 
     def under(*path: str) -> dict[str, Any]:
         return {key[-1]: value for key, value in values.items() if key[:-1] == path}
@@ -130,6 +154,7 @@ def value_of(joint: Joint, free: Free) -> float:
 
 
 _DIFFERENCE = 1e-5  # of a parameter, in its standard deviations, for derivatives
+_STIFFEST = 1e4  # regularisation at which a fit that finds nothing better ends
 _ITERATIONS = 200
 _NEAR = 1e-6  # of a bound, in standard deviations
 CONFIDENT = 1.96  # standard deviations to either side that hold 95 % of a normal distribution
@@ -217,9 +242,9 @@ def _estimate(free: Free, deviation: float, low: float, high: float) -> Estimate
     )
 
 
-def with_priors(residuals: Residuals) -> Residuals:
+def with_priors(residuals: Residuals, prior: float = 1.0) -> Residuals:
     """Residuals and, after them, the deviations themselves, which the priors want to be zero."""
-    return lambda points: np.concatenate([residuals(points), points])
+    return lambda points: np.concatenate([residuals(points), prior * points])
 
 
 def solve(
@@ -227,6 +252,9 @@ def solve(
     count: int,
     progress: Callable[[float], None] | None = None,
     start: NDArray[np.float64] | None = None,
+    prior: float = 1.0,
+    difference: float = _DIFFERENCE,
+    tolerance: float = 1e-8,
 ) -> Solution:
     """Fit ``count`` free parameters.
 
@@ -235,11 +263,14 @@ def solve(
         count: P, the number of free parameters.
         progress: Called with the share done, 0 to 1, guessed from the steps so far.
         start: Deviations to start from, shape (P,); by default the middles of the bounds.
+        prior: Weight of the priors.
+        difference: Of a parameter, in its standard deviations, for derivatives.
+        tolerance: Step, in standard deviations, at which the fit has settled.
 
     Raises:
         RuntimeError: The fit did not settle.
     """
-    all_residuals = with_priors(residuals)
+    all_residuals = with_priors(residuals, prior)
 
     def report(trace: list[mujoco.minimize.IterLog]) -> None:
         if progress:
@@ -250,7 +281,9 @@ def solve(
         np.zeros(count) if start is None else start,
         all_residuals,
         bounds,
-        eps=_DIFFERENCE,
+        eps=difference,
+        mu_max=_STIFFEST,
+        xtol=tolerance,
         max_iter=_ITERATIONS,
         verbose=mujoco.minimize.Verbosity.SILENT,
         iter_callback=report,
@@ -260,7 +293,7 @@ def solve(
     point = point.reshape(count, 1)
     found = all_residuals(point)
     jacobian, _ = mujoco.minimize.jacobian_fd(
-        all_residuals, point, found, np.float64(_DIFFERENCE), 0, [b.reshape(-1, 1) for b in bounds]
+        all_residuals, point, found, np.float64(difference), 0, [b.reshape(-1, 1) for b in bounds]
     )
     covariance = np.linalg.inv(jacobian.T @ jacobian)
     return Solution(point[:, 0], covariance, jacobian, 0.5 * float((found**2).sum()))

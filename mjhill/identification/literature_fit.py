@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import degrees
 from pathlib import Path
@@ -12,15 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.analysis.second_order import SecondOrderStep, fit_step, step_response
-from mjhill.identification.fit import Free, Identified, free_parameters, intervals, joint_at, solve
+from mjhill.identification.fit import Free, Identified, free_parameters, joint_at, solve
+from mjhill.identification.measures import Memory, measure
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import read_joints
 from mjhill.lab.batch import joint_angles
+from mjhill.lab.rig import UnmeasuredError
+from mjhill.literature.facts import Entry, read_entries
 from mjhill.literature.published import EndAngle, PassiveTorque, end_angles, passive_torques
 from mjhill.literature.table2 import SHAPE_SPREAD, Row, rows_of
 
-MAGNITUDE_SPREAD = 0.01  # of MAG: Table 2 has two digits
-DELAY_SPREAD = 0.03  # of T1 + T2
+# standard deviations of what the fit compares; those of facts are published
+MAGNITUDE_SPREAD = 0.02  # of MAG
+DELAY_SPREAD = 0.07  # of T1 + T2
+PRIOR = 0.5  # weight of the priors
+_UNMEASURED = 5.0  # deviation of a fact that cannot be measured
+_DIFFERENCE, _TOLERANCE = 1e-2, 1e-4  # for derivatives, and of the fit [standard deviations]
 _SHAPE_SAMPLES = 60
 _SETTLED = 5.0  # duration of a run, in units of the largest T1 + T2 ...
 _SHORTEST = 0.8  # ... and at least this [s]
@@ -39,12 +46,14 @@ class Evidence:
         steps: Muscle and row of Table 2, for each run.
         torques: Published passive torques.
         ends: Published ends of the active range of motion.
+        facts: Published facts that the fit uses.
     """
 
     joint: Joint
     steps: tuple[tuple[str, Row], ...]
     torques: tuple[PassiveTorque, ...]
     ends: tuple[EndAngle, ...]
+    facts: tuple[Entry, ...] = ()
 
     @property
     def time(self) -> _Values:
@@ -74,13 +83,16 @@ class Evidence:
         signs = np.array([-np.sign(self.joint.gears[name]) for name, _ in self.steps])
         return np.asarray(signs[:, None] * (simulated - start[:, :, None]))
 
-    def residuals(self, free: list[Free], points: _Values) -> _Values:
+    def residuals(
+        self, free: Sequence[Free], points: _Values, memory: Memory | None = None
+    ) -> _Values:
         """Residuals at K points of P deviations, (P, K) -> (R, K)."""
         joints = [joint_at(self.joint, free, point) for point in points.T]
         parts = [np.array([[t.deviation(joint) for t in self.torques] for joint in joints])]
         parts.append(np.array([[end.deviation(joint) for end in self.ends] for joint in joints]))
         if self.steps:
             parts.append(self._step_residuals(self.responses(joints)))
+        parts.extend(_fact_residuals(fact, joints, memory) for fact in self.facts)
         return np.ascontiguousarray(np.concatenate(parts, axis=1).T)
 
     def _step_residuals(self, responses: _Values) -> _Values:
@@ -109,10 +121,23 @@ class Evidence:
         return [fit_step(self.time, response) for response in self.responses([joint])[0]]
 
 
+def _fact_residuals(fact: Entry, joints: Sequence[Joint], memory: Memory | None) -> _Values:
+    """Standard deviations of each joint from a fact, (K, 1)."""
+    try:
+        values = measure(fact, joints, memory)
+    except UnmeasuredError:
+        return np.full((len(joints), 1), _UNMEASURED)
+    return np.asarray(fact.deviation(values)[:, None])
+
+
 def evidence_on(joint: Joint) -> Evidence:
     """The published data about a joint that come with mjhill."""
     steps = tuple((muscle, row) for row in rows_of(joint) for muscle in row.muscles)
-    return Evidence(joint, steps, tuple(passive_torques(joint.name)), tuple(end_angles(joint.name)))
+    facts = tuple(
+        fact for fact in read_entries() if fact.joint == joint.name and not fact.held_out
+    )
+    torques, ends = passive_torques(joint.name), end_angles(joint.name)
+    return Evidence(joint, steps, tuple(torques), tuple(ends), facts)
 
 
 def step_rows(joint: Joint) -> list[dict[str, Any]]:
@@ -210,11 +235,20 @@ def from_literature(
     start = read_joints(parameters)[joint]
     evidence = _evidence(start)
 
-    def residuals(points: NDArray[np.float64]) -> NDArray[np.float64]:
-        return evidence.residuals(free, points)
+    memory: Memory = {}
 
-    solution = solve(residuals, len(free), progress)
-    ends = intervals(residuals, solution, len(free))
+    def residuals(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return evidence.residuals(free, points, memory)
+
+    solution = solve(
+        residuals,
+        len(free),
+        progress,
+        prior=PRIOR,
+        difference=_DIFFERENCE,
+        tolerance=_TOLERANCE,
+    )
+    ends = solution.ends
     fitted = joint_at(start, free, solution.deviations)
     return Identified(fitted, tuple(free), tuple(solution.estimates(free, ends)))
 

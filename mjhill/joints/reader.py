@@ -36,7 +36,8 @@ def read_joints(path: str | Path | None = None) -> dict[str, Joint]:
     """The joints of a parameter file in the form of ``joints.toml``, which is the default.
 
     Every value stands as ``name = { value = ..., source = "..." }``, with ``bounds`` where
-    ``mjhill identify`` may fit it.
+    ``mjhill identify`` may fit it. A joint with ``symmetric = true`` is fitted with both muscles
+    and both sides alike.
 
     Raises:
         ValueError: The file is not TOML, or an entry is missing, unknown, of the wrong kind or out
@@ -92,6 +93,7 @@ def _shipped() -> dict[str, Joint]:
 
 def _joint(name: str, table: Any) -> Joint:
     values = _split(table, name)
+    symmetric = values.pop("symmetric", False)
     muscles, gears = {}, {}
     for muscle, muscle_table in _subtable(values, "muscles", name).items():
         where = f"{name}.muscles.{_name(muscle, f'{name}.muscles: muscle')}"
@@ -100,6 +102,11 @@ def _joint(name: str, table: Any) -> Joint:
         muscles[muscle] = _made(_muscle_class(parts.pop("model", "hill"), where), parts, where)
     if not muscles:
         raise ValueError(f"{name}.muscles: there must be at least one muscle; add one")
+    if not isinstance(symmetric, bool) or (symmetric and len(muscles) != 2):
+        raise ValueError(
+            f"{name}: symmetric must be true or false, and true only for a joint of two muscles, "
+            f"got {_shown(symmetric)} and {len(muscles)}"
+        )
     postures = _split(values.pop("postures", {}), f"{name}.postures")
     stated = {f"postures.{muscle}": source for muscle, source in postures.pop("sources").items()}
     values |= {

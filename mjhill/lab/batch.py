@@ -19,7 +19,74 @@ from mjhill.muscles import steady_states
 CONTROL_AND_TORQUE = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 """What a rollout reads for each step: the excitation of every muscle, then the joint's torque."""
 
+_LOCKED = 1e12  # times the inertia of a joint that is to stay where it is
+
 _Values = NDArray[np.float64]
+
+
+class Rigs:
+    """One simulation for each of several joints: made once, run often.
+
+    Attributes:
+        joints: N joints with the same muscles and gears; other numbers may differ.
+        timestep: Length of a step [s].
+    """
+
+    def __init__(
+        self, joints: Sequence[Joint], *, timestep: float = 1e-3, locked: bool = False
+    ) -> None:
+        """Make the simulations.
+
+        Args:
+            joints: The joints.
+            timestep: Length of a step [s].
+            locked: Whether the joints stay where they start: all contractions are isometric.
+        """
+        self.joints, self.timestep = tuple(joints), timestep
+        self._muscles = len(joints[0].muscles)
+        with installed():  # also while the batch is made: none can run with Python callbacks
+            self._batch = _simulations(joints, timestep)
+        if locked:
+            self._batch.expand("body_inertia")[:, 1] *= _LOCKED
+            self._batch.set_const()
+
+    def run(
+        self,
+        *,
+        start: ArrayLike,
+        velocity: ArrayLike = 0.0,
+        before: ArrayLike = 0.0,
+        excitation: ArrayLike,
+        torque: ArrayLike = 0.0,
+        steps: int,
+        record: Sequence[str] = ("qpos",),
+    ) -> dict[str, _Values]:
+        """Fields of MuJoCo's data over time, each of shape (N, steps, entries).
+
+        Positions and velocities are those at the end of each step, forces those at its start.
+
+        Args:
+            start: Angle at time 0 [rad], broadcast to (N,).
+            velocity: Velocity at time 0 [rad/s], broadcast to (N,).
+            before: Excitation of each muscle before time 0, at which it starts steady [-],
+                broadcast to (N, muscles).
+            excitation: Excitation of each muscle over each step [-], broadcast to
+                (N, steps, muscles).
+            torque: External torque over each step [N·m], broadcast to (N, steps).
+            steps: Number of steps.
+            record: Names of the fields.
+
+        Raises:
+            UnmeasuredError: MuJoCo warned that a simulation went bad.
+        """
+        inputs = np.empty((len(self.joints), steps, self._muscles + 1))
+        inputs[:, :, : self._muscles], inputs[:, :, self._muscles] = excitation, torque
+        with installed():
+            self._batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_NONE))
+            _start(self._batch, self.joints, start, velocity, before)
+            found = self._batch.rollout(steps, inputs, CONTROL_AND_TORQUE, record=record)
+        check_batch(self._batch, self.joints[0])
+        return {str(name): np.asarray(values) for name, values in found.items()}
 
 
 def joint_angles(
@@ -37,28 +104,27 @@ def joint_angles(
 
     Args:
         joints: N joints with the same muscles and gears; other numbers may differ.
-        start: Angle at time 0 [rad], broadcast to (N,).
-        velocity: Velocity at time 0 [rad/s], broadcast to (N,).
-        before: Excitation of each muscle before time 0, at which it starts steady [-], broadcast
-            to (N, muscles).
-        excitation: Excitation of each muscle over each step [-], broadcast to
-            (N, steps, muscles).
-        torque: External torque over each step [N·m], broadcast to (N, steps).
+        start: As in ``Rigs.run``, and so are the others.
+        velocity: See there.
+        before: See there.
+        excitation: See there.
+        torque: See there.
         steps: Number of steps.
         timestep: Length of a step [s].
 
     Raises:
         UnmeasuredError: MuJoCo warned that a simulation went bad.
     """
-    muscles = len(joints[0].muscles)
-    inputs = np.empty((len(joints), steps, muscles + 1))
-    inputs[:, :, :muscles], inputs[:, :, muscles] = excitation, torque
+    found = Rigs(joints, timestep=timestep).run(
+        start=start,
+        velocity=velocity,
+        before=before,
+        excitation=excitation,
+        torque=torque,
+        steps=steps,
+    )
     result = np.empty((len(joints), steps + 1))
-    result[:, 0] = start
-    with installed():  # also while the batch is made: none can run with Python callbacks
-        batch = _batch(joints, start, velocity, before, timestep)
-        result[:, 1:] = batch.rollout(steps, inputs, CONTROL_AND_TORQUE)["qpos"][:, :, 0]
-    check_batch(batch, joints[0])
+    result[:, 0], result[:, 1:] = start, found["qpos"][:, :, 0]
     return result
 
 
@@ -113,6 +179,14 @@ def _batch(
     threads: int = 0,
 ) -> mujoco.batch.Batch:
     """One simulation for each joint, muscles steady at the start; 0 threads means one a core."""
+    batch = _simulations(joints, timestep, threads)
+    _start(batch, joints, start, velocity, before)
+    return batch
+
+
+def _simulations(
+    joints: Sequence[Joint], timestep: float, threads: int = 0
+) -> mujoco.batch.Batch:
     spec = joint_spec(joints[0])
     spec.option.timestep = timestep
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT  # the model has none
@@ -120,10 +194,20 @@ def _batch(
         model = spec.compile()
     batch = mujoco.batch.Batch(model, nsim=len(joints), nthread=threads)
     _expand(batch, joints)
+    return batch
+
+
+def _start(
+    batch: mujoco.batch.Batch,
+    joints: Sequence[Joint],
+    start: ArrayLike,
+    velocity: ArrayLike,
+    before: ArrayLike,
+) -> None:
+    """Put each joint at its start, muscles steady there."""
     batch.qpos[:, 0], batch.qvel[:, 0] = start, velocity
     excitations = np.broadcast_to(before, (len(joints), len(joints[0].muscles)))
     batch.act[:] = _steady_states(joints, batch.qpos[:, 0], excitations)
-    return batch
 
 
 def _expand(batch: mujoco.batch.Batch, joints: Sequence[Joint]) -> None:

@@ -109,6 +109,11 @@ class Spring:
     rest: float
 
 
+def timestep_of(joint: Joint) -> float:
+    """Timestep [s] of a joint on a rig."""
+    return _TIMESTEPS.get(joint.name, _TIMESTEP)
+
+
 def dynamometer(joint: Joint, frequency: float) -> Dynamometer:
     """A dynamometer; joint and coupling have a natural frequency [Hz] and critical damping."""
     omega = 2 * pi * frequency
@@ -135,7 +140,7 @@ def build_rig(
         added_inertia: Inertia of a body fixed to the limb [kg·m²].
     """
     spec = joint_spec(joint)
-    spec.option.timestep = _TIMESTEPS.get(joint.name, _TIMESTEP)
+    spec.option.timestep = timestep_of(joint)
     if machine:
         _mount(spec, joint.name, machine)
     if spring:

@@ -47,6 +47,7 @@ class Entry:
         low: Lower end of the published interval.
         high: Upper end.
         source: Where the interval comes from.
+        held_out: Whether no fit uses it.
     """
 
     joint: str
@@ -58,6 +59,11 @@ class Entry:
     low: float
     high: float
     source: str
+    held_out: bool = False
+
+    def deviation(self, value: Any) -> Any:
+        """Standard deviations of a value, or an array of them, from the published mean."""
+        return (value - 0.5 * (self.low + self.high)) / (0.5 * (self.high - self.low))
 
 
 def read_entries(path: str | Path = _DATA) -> list[Entry]:

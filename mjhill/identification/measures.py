@@ -1,0 +1,165 @@
+"""Published facts measured in simulation, on many joints at once.
+
+Every measure takes N joints with the same muscles and gears and the muscle concerned, then its own
+arguments, and returns a value in SI units for each joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from math import radians
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjhill.joints.joint import Joint
+from mjhill.lab.ballistic import (
+    BallisticMovements,
+    Pulses,
+    ballistic_movements,
+    free_velocities,
+    velocity_intercepts,
+)
+from mjhill.lab.impedance import held_impedance, passive_stiffness, stiffness_slope
+from mjhill.lab.rig import UnmeasuredError
+from mjhill.lab.twitch import twitches
+from mjhill.literature.facts import PER_SI, Entry
+
+_Values = NDArray[np.float64]
+Memory = dict[str, Pulses]
+"""Pulses that the last movements of a kind needed; the next search starts there."""
+
+
+def _ballistic(
+    joints: Sequence[Joint], muscle: str, memory: Memory, degrees: float, options: dict[str, Any]
+) -> BallisticMovements:
+    duration = options.pop("time")
+    kind = f"{muscle} {degrees} {options}"
+    guess = memory.get(kind)
+
+    def move(guess: Pulses | None) -> BallisticMovements:
+        return ballistic_movements(
+            joints, muscle, amplitude=radians(degrees), duration=duration, guess=guess, **options
+        )
+
+    try:
+        found = move(guess)
+    except UnmeasuredError:
+        if guess is None:
+            raise
+        found = move(None)
+    pulses = found.pulses
+    memory[kind] = Pulses(pulses.agonist[:1], pulses.brake[:1], pulses.kind)
+    return found
+
+
+def _ballistic_peak_velocity(
+    joints: Sequence[Joint], muscle: str, memory: Memory, *, degrees: float, **options: Any
+) -> _Values:
+    return _ballistic(joints, muscle, memory, degrees, options).peak_velocity
+
+
+def _ballistic_duration(
+    joints: Sequence[Joint],
+    muscle: str,
+    memory: Memory,
+    *,
+    degrees: float,
+    threshold: float,
+    **options: Any,
+) -> _Values:
+    return _ballistic(joints, muscle, memory, degrees, options).duration(radians(threshold))
+
+
+def _angle(degrees: float | None) -> float | None:
+    return None if degrees is None else radians(degrees)
+
+
+def _twitch_contraction(
+    joints: Sequence[Joint], muscle: str, _: Memory, *, degrees: float | None = None
+) -> _Values:
+    return twitches(joints, muscle, angle=_angle(degrees)).contraction
+
+
+def _twitch_half_relaxation(
+    joints: Sequence[Joint], muscle: str, _: Memory, *, degrees: float | None = None
+) -> _Values:
+    return twitches(joints, muscle, angle=_angle(degrees)).half_relaxation
+
+
+def _twitch_share(
+    joints: Sequence[Joint], muscle: str, _: Memory, *, degrees: float | None = None
+) -> _Values:
+    return twitches(joints, muscle, angle=_angle(degrees)).share
+
+
+def _free_velocity(
+    joints: Sequence[Joint], muscle: str, _: Memory, *, degrees: float | None = None
+) -> _Values:
+    return free_velocities(joints, muscle, angle=_angle(degrees))
+
+
+def _velocity_intercept(joints: Sequence[Joint], muscle: str, _: Memory) -> _Values:
+    return velocity_intercepts(joints, muscle)
+
+
+def _each(measure: Callable[..., float]) -> Callable[..., _Values]:
+    """A measure of one joint, made one of many."""
+
+    def measured(joints: Sequence[Joint], muscle: str, _: Memory, **arguments: Any) -> _Values:
+        return np.array([measure(joint, muscle, **arguments) for joint in joints])
+
+    return measured
+
+
+def _passive_stiffness(joint: Joint, _: str, *, degrees: float) -> float:
+    return passive_stiffness(joint, radians(degrees))
+
+
+def _held_stiffness(joint: Joint, muscle: str, *, share: float, degrees: float) -> float:
+    return held_impedance(joint, muscle, share=share, angle=radians(degrees)).stiffness
+
+
+def _held_damping_ratio(joint: Joint, muscle: str, *, share: float, degrees: float) -> float:
+    return held_impedance(joint, muscle, share=share, angle=radians(degrees)).damping_ratio
+
+
+def _stiffness_slope(
+    joint: Joint, muscle: str, *, shares: Sequence[float], degrees: float
+) -> float:
+    return stiffness_slope(joint, muscle, shares=shares, angle=radians(degrees))
+
+
+MEASURES: Mapping[str, Callable[..., _Values]] = MappingProxyType(
+    {
+        "ballistic_peak_velocity": _ballistic_peak_velocity,
+        "ballistic_duration": _ballistic_duration,
+        "twitch_contraction": _twitch_contraction,
+        "twitch_half_relaxation": _twitch_half_relaxation,
+        "twitch_share": _twitch_share,
+        "free_velocity": _free_velocity,
+        "velocity_intercept": _velocity_intercept,
+        "passive_stiffness": _each(_passive_stiffness),
+        "held_stiffness": _each(_held_stiffness),
+        "held_damping_ratio": _each(_held_damping_ratio),
+        "stiffness_slope": _each(_stiffness_slope),
+    }
+)
+
+
+def measure(entry: Entry, joints: Sequence[Joint], memory: Memory | None = None) -> _Values:
+    """What a fact is for each of N joints, in the unit of the entry, shape (N,).
+
+    Args:
+        entry: The fact.
+        joints: N joints with the same muscles and gears; other numbers may differ.
+        memory: Where searches start and end; give the same one for joints that are almost alike.
+
+    Raises:
+        UnmeasuredError: It cannot be measured on one of them.
+    """
+    known = {} if memory is None else memory
+    value = MEASURES[entry.measure](joints, entry.muscle, known, **entry.arguments)
+    return np.asarray(PER_SI[entry.unit] * value)
