@@ -333,7 +333,9 @@ class _Place:
         return 0.5 * float(self.found @ self.found)
 
 
-def intervals(residuals: Residuals, solution: Solution, count: int) -> _Values:
+def intervals(
+    residuals: Residuals, solution: Solution, count: int, prior: float = 1.0
+) -> _Values:
     """Ends of the intervals of 95 % of the first parameters, in deviations, shape (count, 2).
 
     Never narrower than those of the covariance.
@@ -342,8 +344,9 @@ def intervals(residuals: Residuals, solution: Solution, count: int) -> _Values:
         residuals: What was solved.
         solution: Its solution.
         count: Number of parameters whose intervals are wanted.
+        prior: Weight of the priors.
     """
-    evaluate = with_priors(residuals)
+    evaluate = with_priors(residuals, prior)
     ends = solution.ends[:count]
     origin = solution.deviations
     start = evaluate(origin[:, None])[:, 0]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.analysis.second_order import SecondOrderStep, fit_step, step_response
-from mjhill.identification.fit import Free, Identified, free_parameters, joint_at, solve
+from mjhill.identification.fit import Free, Identified, free_parameters, intervals, joint_at, solve
 from mjhill.identification.measures import Memory, measure
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import read_joints
@@ -26,7 +26,7 @@ from mjhill.literature.table2 import SHAPE_SPREAD, Row, rows_of
 MAGNITUDE_SPREAD = 0.02  # of MAG
 DELAY_SPREAD = 0.07  # of T1 + T2
 PRIOR = 0.5  # weight of the priors
-_UNMEASURED = 5.0  # deviation of a fact that cannot be measured
+_UNMEASURED = 5.0  # deviation of what cannot be measured
 _DIFFERENCE, _TOLERANCE = 1e-2, 1e-4  # for derivatives, and of the fit [standard deviations]
 _SHAPE_SAMPLES = 60
 _SETTLED = 5.0  # duration of a run, in units of the largest T1 + T2 ...
@@ -91,9 +91,18 @@ class Evidence:
         parts = [np.array([[t.deviation(joint) for t in self.torques] for joint in joints])]
         parts.append(np.array([[end.deviation(joint) for end in self.ends] for joint in joints]))
         if self.steps:
-            parts.append(self._step_residuals(self.responses(joints)))
+            parts.append(self._step_residuals(self._known_responses(joints)))
         parts.extend(_fact_residuals(fact, joints, memory) for fact in self.facts)
         return np.ascontiguousarray(np.concatenate(parts, axis=1).T)
+
+    def _known_responses(self, joints: list[Joint]) -> _Values:
+        """``responses``, NaN for a joint whose simulation goes bad."""
+        try:
+            return self.responses(joints)
+        except UnmeasuredError:
+            if len(joints) == 1:
+                return np.full((1, len(self.steps), len(self.time)), np.nan)
+            return np.concatenate([self._known_responses([joint]) for joint in joints])
 
     def _step_residuals(self, responses: _Values) -> _Values:
         """Residuals of the steps' ends, delays and shapes, (K, steps, T) -> (K, R)."""
@@ -112,7 +121,7 @@ class Evidence:
             delay_error / (DELAY_SPREAD * delay),
             shape.reshape(len(responses), -1),
         ]
-        return np.concatenate(parts, axis=1)
+        return np.nan_to_num(np.concatenate(parts, axis=1), nan=_UNMEASURED)
 
     def fits(self, joint: Joint) -> list[SecondOrderStep]:
         """Second-order fits of a joint's steps, in the order of ``steps``."""
@@ -248,7 +257,7 @@ def from_literature(
         difference=_DIFFERENCE,
         tolerance=_TOLERANCE,
     )
-    ends = solution.ends
+    ends = intervals(residuals, solution, len(free), PRIOR)
     fitted = joint_at(start, free, solution.deviations)
     return Identified(fitted, tuple(free), tuple(solution.estimates(free, ends)))
 
