@@ -118,18 +118,36 @@ def _passive_stiffness(joint: Joint, _: str, *, degrees: float) -> float:
     return passive_stiffness(joint, radians(degrees))
 
 
-def _held_stiffness(joint: Joint, muscle: str, *, share: float, degrees: float) -> float:
-    return held_impedance(joint, muscle, share=share, angle=radians(degrees)).stiffness
+def _held_stiffness(
+    joint: Joint, muscle: str, *, share: float, degrees: float, band: Sequence[float], reading: str
+) -> float:
+    low, high = band
+    held = held_impedance(joint, muscle, share=share, angle=radians(degrees), band=(low, high))
+    return held.stiffness(reading)
 
 
-def _held_damping_ratio(joint: Joint, muscle: str, *, share: float, degrees: float) -> float:
-    return held_impedance(joint, muscle, share=share, angle=radians(degrees)).damping_ratio
+def _held_damping_ratio(
+    joint: Joint, muscle: str, *, share: float, degrees: float, band: Sequence[float]
+) -> float:
+    low, high = band
+    held = held_impedance(joint, muscle, share=share, angle=radians(degrees), band=(low, high))
+    return held.damping_ratio
 
 
 def _stiffness_slope(
-    joint: Joint, muscle: str, *, shares: Sequence[float], degrees: float
+    joint: Joint,
+    muscle: str,
+    *,
+    shares: Sequence[float],
+    degrees: float,
+    band: Sequence[float],
+    reading: str,
 ) -> float:
-    return stiffness_slope(joint, muscle, shares=shares, angle=radians(degrees))
+    low, high = band
+    angle = radians(degrees)
+    return stiffness_slope(
+        joint, muscle, shares=shares, angle=angle, band=(low, high), reading=reading
+    )
 
 
 MEASURES: Mapping[str, Callable[..., _Values]] = MappingProxyType(

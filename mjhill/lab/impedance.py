@@ -1,57 +1,83 @@
-"""Stiffness and damping of a joint: at rest, and while a muscle holds a torque."""
+"""Impedance of a joint that holds a posture: torque over angle for small oscillations.
+
+Excitations are constant, so activations are; there are no reflexes. About the held state the
+equations of a muscle are linear but for one kink: at rest, Hill's relation is steeper for
+lengthening than for shortening. A small oscillation goes equally to both sides of it, so the
+slope is the mean of the two.
+
+Studies read two stiffnesses from an impedance. Zahalak & Heyman (1979, J. Biomech. Eng. 101:28)
+forced sinusoidal oscillations: ``storage`` is the part in phase with the angle, less that of the
+inertia. Hunter & Kearney (1982), Weiss, Hunter & Kearney (1988, J. Biomech. 21:539) and others
+moved joints at random and fitted inertia, viscosity and stiffness to the torque: ``second_order``
+is that fit, for an angle of even spectrum over the band. A muscle yields when it is moved slowly and is as stiff as its tendon
+when it is moved fast, so the two differ.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import radians, sqrt
+from math import degrees, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.analysis.responses import SecondOrder, second_order_fit
-from mjhill.analysis.swing import second_order_response
+from mjhill.analysis.responses import SecondOrder
 from mjhill.joints.joint import Joint
-from mjhill.lab.rig import (
-    Rig,
-    UnmeasuredError,
-    at_rest,
-    build_rig,
-    direction,
-    muscle_torque,
-    net_torque,
-    record_run,
+from mjhill.lab.rig import UnmeasuredError, muscle_torque
+from mjhill.muscles.hill import Hill
+from mjhill.muscles.readings import (
+    isometric_share,
+    series_stiffness,
+    shortening_velocity,
+    steady_stretch,
 )
-from mjhill.simulate.recording import Recording
 from mjhill.simulate.reference import plant_torque
-from mjhill.simulate.signals import pulse
 
-_DEFLECTION = radians(1.0)  # what a hit is to move the joint by [rad]
-_CLOSE = 0.05  # of it, near enough
-_TRIES = 8
-_HIT, _WINDOW = 0.02, 0.1  # width of the hit and length of the fit, from the start of the hit [s]
-_EXPLAINED = 0.9  # least share of the deflection's variance that a fit must account for [-]
+READINGS = ("storage", "second_order")  # of the stiffness in an impedance
+_FREQUENCIES = 59  # in a band
+_NUDGE = 1e-6  # of an angle [rad], or of a stretch in units of its largest
+
+_Complex = NDArray[np.complex128]
+_Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Impedance:
-    """A joint that holds a torque, as a spring and a damper for 100 ms after a small hit.
+    """The impedance of a joint while a muscle holds a torque.
 
     Attributes:
         torque: What the muscle holds, without sign [N·m].
-        stiffness: K [N·m/rad].
-        damping: B [N·m·s/rad].
-        damping_ratio: B over 2 sqrt(J K) [-].
-        explained: Share of the deflection's variance that the fit accounts for [-].
-        run: The recording.
+        frequencies: Evenly spaced over the band [Hz], shape (F,).
+        impedance: Torque over angle there [N·m/rad], complex, shape (F,).
+        storage: Stiffness in phase with the angle, without the inertia's, mean over the band
+            [N·m/rad].
+        second_order: Inertia, viscosity and stiffness whose impedance is nearest.
+        explained: Share of the torque's variance that these account for [-].
     """
 
     torque: float
-    stiffness: float
-    damping: float
-    damping_ratio: float
+    frequencies: _Values
+    impedance: _Complex
+    storage: float
+    second_order: SecondOrder
     explained: float
-    run: Recording
+
+    def stiffness(self, reading: str) -> float:
+        """Stiffness by a reading, ``storage`` or ``second_order`` [N·m/rad].
+
+        Raises:
+            ValueError: There is no such reading.
+        """
+        if reading not in READINGS:
+            raise ValueError(f"unknown reading {reading!r}; there are: {', '.join(READINGS)}")
+        return self.storage if reading == "storage" else self.second_order.stiffness
+
+    @property
+    def damping_ratio(self) -> float:
+        """B over 2 sqrt(I K) of the second-order fit [-]."""
+        fit = self.second_order
+        return fit.damping / (2 * sqrt(fit.inertia * fit.stiffness))
 
 
 def passive_stiffness(joint: Joint, deflection: float) -> float:
@@ -61,79 +87,118 @@ def passive_stiffness(joint: Joint, deflection: float) -> float:
     return (low - high) / (2 * deflection)
 
 
-def held_impedance(joint: Joint, muscle: str, *, share: float, angle: float) -> Impedance:
-    """Impedance while a muscle holds ``share`` of its largest torque at ``angle`` [rad].
+def joint_impedance(
+    joint: Joint, excitations: Mapping[str, float], angle: float, frequencies: _Values
+) -> _Complex:
+    """Torque over angle of small oscillations about a held posture [N·m/rad], shape (F,).
 
-    An equal and opposite constant torque from outside holds the joint there; a hit of 20 ms
-    that stretches the muscle deflects it by 1°.
+    Args:
+        joint: The joint; its muscles are of the model ``hill``.
+        excitations: Constant excitation by muscle [-]; 0 for those without an entry.
+        angle: The posture [rad]; an external torque holds the joint there.
+        frequencies: Of the oscillations [Hz], shape (F,).
 
     Raises:
-        UnmeasuredError: The posture is not stable, or the joint does not move like a second-order
-            system.
+        ValueError: A muscle is of another model.
     """
-    bench = build_rig(joint, exact=True)
-    recording, hit, load = _hit_by_a_degree(bench, muscle, share, angle)
-    # along the hit all is positive
-    sign = -direction(joint, muscle)
-    time, applied = recording.time, sign * (recording[f"{joint.name}.applied"] - load)
-    deflection = sign * (recording[f"{joint.name}.angle"] - angle)
-    velocity = sign * recording[f"{joint.name}.velocity"]
-    fit = second_order_fit(time, deflection, velocity, applied, joint.inertia)
-    if fit.stiffness <= 0:
-        raise UnmeasuredError(
-            f"with {muscle} at {share:g} the joint yields instead of coming back: the fitted "
-            f"stiffness is {fit.stiffness:.3g} N·m/rad"
-        )
-    explained = _explained(fit, time, deflection, applied)
-    if explained < _EXPLAINED:
-        raise UnmeasuredError(
-            f"with {muscle} at {share:g} a second-order system accounts for only "
-            f"{explained:.0%} of the deflection after a hit of {hit:.3g} N·m"
-        )
-    torque = abs(muscle_torque(joint, muscle, share, angle))
-    ratio = fit.damping / (2 * sqrt(joint.inertia * fit.stiffness))
-    return Impedance(torque, fit.stiffness, fit.damping, ratio, explained, recording)
+    s = 2j * pi * np.asarray(frequencies)
+    ends = [plant_torque(joint, angle + nudge) for nudge in (-_NUDGE, _NUDGE)]
+    total = joint.inertia * s**2 + joint.damping * s + (ends[0] - ends[1]) / (2 * _NUDGE)
+    for name, muscle in joint.hill_muscles.items():
+        gear = joint.gears[name]
+        total += gear**2 * _muscle_impedance(muscle, excitations.get(name, 0.0), gear * angle, s)
+    return np.asarray(total)
 
 
-def stiffness_slope(joint: Joint, muscle: str, *, shares: Sequence[float], angle: float) -> float:
+def _muscle_impedance(muscle: Hill, activation: float, length: float, s: _Complex) -> _Complex:
+    """Tension over length of a muscle: its contractile element in series with the other."""
+    stretch, nudge = steady_stretch(muscle, activation, length), _NUDGE * muscle.series_stretch
+    series = series_stiffness(muscle, stretch)
+    slower, faster = (
+        abs(shortening_velocity(muscle, activation, length, stretch + change))
+        for change in (nudge, -nudge)
+    )
+    viscosity = 0.5 * series * nudge * (1 / slower + 1 / faster)
+    ends = [isometric_share(muscle, activation, length + change) for change in (-_NUDGE, _NUDGE)]
+    by_length = muscle.max_isometric_force * (ends[1] - ends[0]) / (2 * _NUDGE)
+    return np.asarray(series * (by_length + viscosity * s) / (series + viscosity * s))
+
+
+def held_impedance(
+    joint: Joint,
+    muscle: str,
+    *,
+    share: float,
+    angle: float,
+    band: tuple[float, float] = (1.0, 30.0),
+) -> Impedance:
+    """Impedance while a muscle holds ``share`` of its largest torque at ``angle`` [rad].
+
+    Args:
+        joint: The joint; its muscles are of the model ``hill``.
+        muscle: The muscle that is active; the others are at rest.
+        share: Its excitation [-].
+        angle: The posture [rad]; an external torque holds the joint there.
+        band: Lowest and highest frequency [Hz].
+
+    Raises:
+        UnmeasuredError: The joint yields, so no second-order system is like it.
+        ValueError: A muscle is of another model than ``hill``, or the band does not ascend.
+    """
+    low, high = band
+    if not 0 < low < high:
+        raise ValueError(f"band must be two ascending frequencies above 0 Hz, got {band}")
+    frequencies = np.linspace(low, high, _FREQUENCIES)
+    impedance = joint_impedance(joint, {muscle: share}, angle, frequencies)
+    fit = _second_order(frequencies, impedance)
+    if min(fit) <= 0:
+        raise UnmeasuredError(
+            f"with {muscle} at {share:g} and {degrees(angle):.3g}° no inertia, viscosity and "
+            f"stiffness above 0 are like it: {fit.inertia:.3g} kg·m², {fit.damping:.3g} N·m·s/rad, "
+            f"{fit.stiffness:.3g} N·m/rad"
+        )
+    left = impedance - _system(fit, frequencies)
+    storage = impedance.real + joint.inertia * (2 * pi * frequencies) ** 2
+    return Impedance(
+        abs(muscle_torque(joint, muscle, share, angle)),
+        frequencies,
+        impedance,
+        float(storage.mean()),
+        fit,
+        float(1 - np.sum(np.abs(left) ** 2) / np.sum(np.abs(impedance) ** 2)),
+    )
+
+
+def _system(fit: SecondOrder, frequencies: _Values) -> _Complex:
+    s = 2j * pi * frequencies
+    return np.asarray(fit.inertia * s**2 + fit.damping * s + fit.stiffness)
+
+
+def _second_order(frequencies: _Values, impedance: _Complex) -> SecondOrder:
+    """The second-order system whose impedance is nearest in least squares."""
+    omega = 2 * pi * frequencies
+    terms = np.stack([np.ones_like(omega), -(omega**2)], axis=1)
+    (stiffness, inertia), *_ = np.linalg.lstsq(terms, impedance.real, rcond=None)
+    damping = omega @ impedance.imag / (omega @ omega)
+    return SecondOrder(float(stiffness), float(damping), float(inertia))
+
+
+def stiffness_slope(
+    joint: Joint,
+    muscle: str,
+    *,
+    shares: Sequence[float],
+    angle: float,
+    band: tuple[float, float] = (1.0, 30.0),
+    reading: str = "second_order",
+) -> float:
     """Rise of stiffness with held torque, dK/dT [1/rad], a line through several levels.
 
     Raises:
         UnmeasuredError: As ``held_impedance``, at any of the levels.
+        ValueError: As ``held_impedance``, or there is no such reading.
     """
-    held = [held_impedance(joint, muscle, share=share, angle=angle) for share in shares]
-    slope, _ = np.polyfit([one.torque for one in held], [one.stiffness for one in held], 1)
+    held = [held_impedance(joint, muscle, share=share, angle=angle, band=band) for share in shares]
+    stiffness = [one.stiffness(reading) for one in held]
+    slope, _ = np.polyfit([one.torque for one in held], stiffness, 1)
     return float(slope)
-
-
-def _hit_by_a_degree(
-    bench: Rig, muscle: str, share: float, angle: float
-) -> tuple[Recording, float, float]:
-    """The run in which a hit deflects the joint by 1°, the hit and the steady load [N·m]."""
-    joint, levels = bench.joint, {muscle: share}
-    load = -net_torque(joint, levels, angle)
-    sign = -direction(joint, muscle)
-    hit = joint.inertia * _DEFLECTION / _HIT**2
-    for _ in range(_TRIES):
-        start = at_rest(bench, angle, levels)
-        recording = record_run(
-            bench, start, _WINDOW, torque=sign * hit * pulse(1.0, 0.0, _HIT) + load
-        )
-        reached = float((sign * (recording[f"{joint.name}.angle"] - angle)).max())
-        if abs(reached - _DEFLECTION) <= _CLOSE * _DEFLECTION:
-            return recording, hit, load
-        hit *= _DEFLECTION / max(reached, 0.01 * _DEFLECTION)
-    raise UnmeasuredError(
-        f"with {muscle} at {share:g} no hit of {_HIT * 1e3:g} ms deflects it by 1°"
-    )
-
-
-def _explained(
-    fit: SecondOrder,
-    time: NDArray[np.float64],
-    deflection: NDArray[np.float64],
-    load: NDArray[np.float64],
-) -> float:
-    """Share of a deflection's variance that the fitted system accounts for under the load."""
-    fitted = second_order_response(fit, time, load)
-    return float(1.0 - np.var(deflection - fitted) / np.var(deflection))
