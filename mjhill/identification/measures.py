@@ -20,7 +20,7 @@ from mjhill.lab.ballistic import (
     Pulses,
     ballistic_movements,
     free_velocities,
-    velocity_intercepts,
+    isokinetic_velocities,
 )
 from mjhill.lab.impedance import held_impedance, passive_stiffness, stiffness_slope
 from mjhill.lab.rig import UnmeasuredError
@@ -101,8 +101,10 @@ def _free_velocity(
     return free_velocities(joints, muscle, angle=_angle(degrees))
 
 
-def _velocity_intercept(joints: Sequence[Joint], muscle: str, _: Memory) -> _Values:
-    return velocity_intercepts(joints, muscle)
+def _isokinetic_velocity(
+    joints: Sequence[Joint], muscle: str, _: Memory, *, share: float
+) -> _Values:
+    return isokinetic_velocities(joints, muscle, share=share)
 
 
 def _each(measure: Callable[..., float]) -> Callable[..., _Values]:
@@ -158,7 +160,7 @@ MEASURES: Mapping[str, Callable[..., _Values]] = MappingProxyType(
         "twitch_half_relaxation": _twitch_half_relaxation,
         "twitch_share": _twitch_share,
         "free_velocity": _free_velocity,
-        "velocity_intercept": _velocity_intercept,
+        "isokinetic_velocity": _isokinetic_velocity,
         "passive_stiffness": _each(_passive_stiffness),
         "held_stiffness": _each(_held_stiffness),
         "held_damping_ratio": _each(_held_damping_ratio),

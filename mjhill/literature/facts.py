@@ -22,7 +22,7 @@ MEASURES = (  # that an entry can name
     "twitch_half_relaxation",
     "twitch_share",
     "free_velocity",
-    "velocity_intercept",
+    "isokinetic_velocity",
     "passive_stiffness",
     "held_stiffness",
     "held_damping_ratio",

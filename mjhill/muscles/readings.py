@@ -24,6 +24,7 @@ __all__ = [
     "shortening_velocity",
     "steady_stretch",
     "tension",
+    "velocity_at_share",
     "velocity_limit",
 ]
 
@@ -55,6 +56,11 @@ def shortening_velocity(muscle: Hill, activation: float, length: float, stretch:
     share = tension(muscle, stretch) / muscle.max_isometric_force
     active = isometric_share(muscle, activation, length)
     return float(MODEL.ask(velocity_at_force, muscle, force=share, share=active))
+
+
+def velocity_at_share(muscle: Contractile, share: float) -> float:
+    """Velocity [rad/s or m/s] at which a fully active muscle has a share of its isometric force."""
+    return float(MODEL.ask(velocity_at_force, muscle, force=share, share=1.0))
 
 
 def contractile_force(
