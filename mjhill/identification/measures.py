@@ -26,6 +26,7 @@ from mjhill.lab.impedance import held_impedance, passive_stiffness, stiffness_sl
 from mjhill.lab.rig import UnmeasuredError
 from mjhill.lab.twitch import twitches
 from mjhill.literature.facts import PER_SI, Entry
+from mjhill.muscles.readings import series_stiffness, stretch_at
 
 _Values = NDArray[np.float64]
 Memory = dict[str, Pulses]
@@ -152,6 +153,16 @@ def _stiffness_slope(
     )
 
 
+def _series_stretch(joint: Joint, muscle: str, *, torque: float) -> float:
+    hill, gear = joint.hill_muscles[muscle], abs(joint.gears[muscle])
+    return stretch_at(hill, torque / gear) / gear
+
+
+def _series_stiffness(joint: Joint, muscle: str, *, torque: float) -> float:
+    hill, gear = joint.hill_muscles[muscle], abs(joint.gears[muscle])
+    return gear**2 * series_stiffness(hill, stretch_at(hill, torque / gear))
+
+
 MEASURES: Mapping[str, Callable[..., _Values]] = MappingProxyType(
     {
         "ballistic_peak_velocity": _ballistic_peak_velocity,
@@ -161,6 +172,8 @@ MEASURES: Mapping[str, Callable[..., _Values]] = MappingProxyType(
         "twitch_share": _twitch_share,
         "free_velocity": _free_velocity,
         "isokinetic_velocity": _isokinetic_velocity,
+        "series_stretch": _each(_series_stretch),
+        "series_stiffness": _each(_series_stiffness),
         "passive_stiffness": _each(_passive_stiffness),
         "held_stiffness": _each(_held_stiffness),
         "held_damping_ratio": _each(_held_damping_ratio),
