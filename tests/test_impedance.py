@@ -162,11 +162,13 @@ def test_a_wider_oscillation_finds_less_stiffness():
     assert wide[0].mean() == pytest.approx(small.mean(), rel=0.12)
 
 
-def test_a_random_movement_of_the_ankle_finds_the_second_order_system():
+@pytest.mark.parametrize(("spread", "tolerance"), [(0.02, 0.01), (0.25, 0.07)])
+def test_a_random_movement_of_the_ankle_finds_the_second_order_system(spread, tolerance):
+    # a standard deviation of 0.25° is 1.4° from end to end
     joint, held = mjhill.JOINTS["ankle"], {"ankle_plantarflexor": 0.3}
     lines = np.arange(1.0, 31.0)  # every line of a second, with even amplitude and random phase
     phases = np.random.default_rng(1).uniform(0, 2 * pi, len(lines))
-    omega, size = 2 * pi * lines, radians(0.02) / sqrt(0.5 * len(lines))
+    omega, size = 2 * pi * lines, radians(spread) / sqrt(0.5 * len(lines))
     _, deflection, torque = torque_on(
         joint, held, 0.0,
         lambda t: size * np.sin(omega * t + phases).sum(),
@@ -178,8 +180,8 @@ def test_a_random_movement_of_the_ankle_finds_the_second_order_system():
     spectra = [np.fft.rfft(values[last])[1:31] for values in (deflection, torque)]
     found, explained = fit_compliance(lines, spectra[0] / spectra[1])
     expected, share = fit_compliance(lines, 1 / joint_impedance(joint, held, 0.0, lines))
-    assert tuple(found) == pytest.approx(tuple(expected), rel=0.01)
-    assert explained == pytest.approx(share, abs=0.01)
+    assert tuple(found) == pytest.approx(tuple(expected), rel=tolerance)
+    assert explained == pytest.approx(share, abs=tolerance)
     assert share > 0.9
 
 

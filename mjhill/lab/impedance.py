@@ -15,6 +15,9 @@ from such an impedance:
 A muscle yields when it is moved slowly and is as stiff as its series element when it is moved
 fast, so the two differ, and both depend on the band. Where no second-order system is like the
 joint, ``explained`` is low.
+
+Oscillations are small here: the equations are linear. Hill's relation is curved, so wider ones
+find less; ``tests/test_impedance.py`` simulates some. The abstracts give no amplitudes.
 """
 
 from __future__ import annotations
