@@ -20,7 +20,7 @@ from mjhill.lab.ballistic import (
     Pulses,
     ballistic_movements,
     free_velocities,
-    velocity_intercepts,
+    isokinetic_velocities,
 )
 from mjhill.lab.impedance import (
     READINGS,
@@ -32,6 +32,7 @@ from mjhill.lab.impedance import (
 from mjhill.lab.rig import UnmeasuredError
 from mjhill.lab.twitch import twitches
 from mjhill.literature.facts import PER_SI, Entry
+from mjhill.muscles.readings import series_stiffness, stretch_at
 
 _Values = NDArray[np.float64]
 Memory = dict[str, Pulses]
@@ -107,8 +108,10 @@ def _free_velocity(
     return free_velocities(joints, muscle, angle=_angle(degrees))
 
 
-def _velocity_intercept(joints: Sequence[Joint], muscle: str, _: Memory) -> _Values:
-    return velocity_intercepts(joints, muscle)
+def _isokinetic_velocity(
+    joints: Sequence[Joint], muscle: str, _: Memory, *, share: float
+) -> _Values:
+    return isokinetic_velocities(joints, muscle, share=share)
 
 
 def _each(measure: Callable[..., float]) -> Callable[..., _Values]:
@@ -146,6 +149,16 @@ def _stiffness_slope(
     return stiffness_slope(levels, reading)
 
 
+def _series_stretch(joint: Joint, muscle: str, *, torque: float) -> float:
+    hill, gear = joint.hill_muscles[muscle], abs(joint.gears[muscle])
+    return stretch_at(hill, torque / gear) / gear
+
+
+def _series_stiffness(joint: Joint, muscle: str, *, torque: float) -> float:
+    hill, gear = joint.hill_muscles[muscle], abs(joint.gears[muscle])
+    return gear**2 * series_stiffness(hill, stretch_at(hill, torque / gear))
+
+
 MEASURES: Mapping[str, Callable[..., _Values]] = MappingProxyType(
     {
         "ballistic_peak_velocity": _ballistic_peak_velocity,
@@ -154,7 +167,9 @@ MEASURES: Mapping[str, Callable[..., _Values]] = MappingProxyType(
         "twitch_half_relaxation": _twitch_half_relaxation,
         "twitch_share": _twitch_share,
         "free_velocity": _free_velocity,
-        "velocity_intercept": _velocity_intercept,
+        "isokinetic_velocity": _isokinetic_velocity,
+        "series_stretch": _each(_series_stretch),
+        "series_stiffness": _each(_series_stiffness),
         "passive_stiffness": _each(_passive_stiffness),
         "held_stiffness": _each(_held_stiffness),
         "held_damping_ratio": _each(_held_damping_ratio),

@@ -23,6 +23,8 @@ from mjhill.joints.joint import Joint
 from mjhill.lab.batch import Rigs
 from mjhill.lab.postures import tonic_excitations
 from mjhill.lab.rig import UnmeasuredError, antagonist, direction, timestep_of
+from mjhill.muscles import contractile_of
+from mjhill.muscles.readings import velocity_at_share
 
 FALL_BACK = 0.05  # of the amplitude: a braked movement comes back by no more after its peak
 _FREE_TIME = 1.0  # [s]; the slowest joint has crossed its range by then
@@ -379,11 +381,22 @@ def free_velocities(
     return np.asarray(full)
 
 
-def velocity_intercepts(joints: Sequence[Joint], muscle: str) -> _Values:
-    """Velocity [rad/s] at which Hill's relation of a muscle carries no load, fully active.
+def isokinetic_velocities(joints: Sequence[Joint], muscle: str, *, share: float) -> _Values:
+    """Velocity [rad/s] at which a muscle has a share of its isometric torque, shape (N,).
 
-    What torque-velocity curves measured under loads are extrapolated to. Shape (N,).
+    Fully active, at one angle, as a dynamometer measures it; the series element keeps its length.
+    A share of 0 is the velocity that torque-velocity curves measured under loads are extrapolated
+    to.
+
+    Args:
+        joints: N joints with the same muscles and gears.
+        muscle: The muscle, of a model with Hill's contractile element.
+        share: Torque over isometric torque [-], 0 to 1.
     """
     return np.array(
-        [joint.hill_muscles[muscle].max_velocity / abs(joint.gears[muscle]) for joint in joints]
+        [
+            velocity_at_share(contractile_of(joint.muscles[muscle]), share)
+            / abs(joint.gears[muscle])
+            for joint in joints
+        ]
     )

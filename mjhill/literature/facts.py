@@ -22,14 +22,16 @@ MEASURES = (  # that an entry can name
     "twitch_half_relaxation",
     "twitch_share",
     "free_velocity",
-    "velocity_intercept",
+    "isokinetic_velocity",
+    "series_stretch",
+    "series_stiffness",
     "passive_stiffness",
     "held_stiffness",
     "held_damping_ratio",
     "stiffness_slope",
 )
 PER_SI = MappingProxyType(
-    {"°/s": 180 / pi, "ms": 1e3, "%": 1e2, "rad/s": 1, "N·m/rad": 1, "1/rad": 1, "-": 1}
+    {"°": 180 / pi, "°/s": 180 / pi, "ms": 1e3, "%": 1e2, "rad/s": 1, "N·m/rad": 1, "1/rad": 1, "-": 1}
 )
 
 

@@ -5,7 +5,7 @@ For muscles with Hill's contractile element; what is about the series element ne
 
 from __future__ import annotations
 
-from mjhill.elements import series_force
+from mjhill.elements import series_force, series_stretch_at
 from mjhill.muscles.hill import MODEL, Hill, series_energy
 from mjhill.muscles.hill import steady_stretch as _steady_stretch
 from mjhill.muscles.parts import (
@@ -23,7 +23,9 @@ __all__ = [
     "series_stiffness",
     "shortening_velocity",
     "steady_stretch",
+    "stretch_at",
     "tension",
+    "velocity_at_share",
     "velocity_limit",
 ]
 
@@ -36,6 +38,14 @@ def tension(muscle: Hill, stretch: float) -> float:
 def series_stiffness(muscle: Hill, stretch: float) -> float:
     """Slope of the muscle's force over the stretch of its series element [N·m/rad or N/m]."""
     return _series(muscle, stretch)[1]
+
+
+def stretch_at(muscle: Hill, force: float) -> float:
+    """Stretch of the series element [rad or m] that carries a force [N·m or N]."""
+    share = force / muscle.max_isometric_force
+    return series_stretch_at(
+        share, muscle.series_stretch, muscle.series_shape, muscle.series_limit
+    )
 
 
 def _series(muscle: Hill, stretch: float) -> tuple[float, float]:
@@ -55,6 +65,11 @@ def shortening_velocity(muscle: Hill, activation: float, length: float, stretch:
     share = tension(muscle, stretch) / muscle.max_isometric_force
     active = isometric_share(muscle, activation, length)
     return float(MODEL.ask(velocity_at_force, muscle, force=share, share=active))
+
+
+def velocity_at_share(muscle: Contractile, share: float) -> float:
+    """Velocity [rad/s or m/s] at which a fully active muscle has a share of its isometric force."""
+    return float(MODEL.ask(velocity_at_force, muscle, force=share, share=1.0))
 
 
 def contractile_force(
