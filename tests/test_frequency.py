@@ -7,6 +7,7 @@ from scipy.signal import lsim
 from mjhill.analysis.frequency import (
     SecondOrderFrequency,
     decibel,
+    fit_compliance,
     fit_second_order,
     octaves,
     response_at,
@@ -73,6 +74,34 @@ def test_second_order_fit_does_not_mind_whole_turns_of_phase():
     gain, phase = np.abs(response), np.angle(response)
     one, other = (fit_second_order(BAND, gain, p) for p in (phase, phase + 2 * pi))
     assert one.damping_ratio == pytest.approx(other.damping_ratio, rel=1e-6)
+
+
+@pytest.mark.parametrize("truth", [(30.0, 0.5, 0.02), (2.0, 6.0, 0.05), (1e3, 1.0, 0.02)])
+def test_a_fit_to_compliance_finds_the_system_it_was_given(truth):
+    stiffness, damping, inertia = truth
+    band = np.linspace(1.0, 15.0, 30)
+    s = 2j * pi * band
+    fit, explained = fit_compliance(band, 1 / (inertia * s**2 + damping * s + stiffness))
+    assert tuple(fit) == pytest.approx(truth, rel=1e-6)
+    assert explained == pytest.approx(1.0)
+
+
+def test_a_fit_to_compliance_is_nearer_than_any_system_beside_it():
+    band = np.linspace(1.0, 15.0, 30)
+    s = 2j * pi * band
+    compliance = 1 / (0.02 * s**2 + 0.5 * s + 40.0 + 400.0 * s / (s + 20.0))  # no second order
+
+    def misfit(stiffness, damping, inertia):
+        return np.sum(np.abs(1 / (inertia * s**2 + damping * s + stiffness) - compliance) ** 2)
+
+    fit, explained = fit_compliance(band, compliance)
+    least = misfit(*fit)
+    assert explained == pytest.approx(1 - least / np.sum(np.abs(compliance) ** 2))
+    for place in range(3):
+        for factor in (0.99, 1.01):
+            beside = list(fit)
+            beside[place] *= factor
+            assert misfit(*beside) > least
 
 
 def test_a_second_order_system_is_second_order_over_the_whole_band():

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import log10, pi, radians
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from mjhill.analysis.responses import SecondOrder
 
 _Values = NDArray[np.float64]
 _WIDEST = 1e3  # largest factor of a natural frequency from the band, of a damping ratio from 1
@@ -136,6 +139,50 @@ def fit_second_order(
     ]
     best = min(fits, key=lambda fit: float(fit.cost))
     return SecondOrderFrequency(*np.exp(best.x).tolist())
+
+
+def fit_compliance(frequency: ArrayLike, compliance: ArrayLike) -> tuple[SecondOrder, float]:
+    """Inertia, viscosity and stiffness whose compliance is nearest in least squares.
+
+    By Parseval's theorem this is the fit to an impulse response that has these frequencies alone
+    (Weiss, Hunter & Kearney 1988, J. Biomech. 21:539, abstract).
+
+    Args:
+        frequency: Evenly spaced [Hz], shape (F,), at least two.
+        compliance: Deflection over torque [rad/(N·m)], complex, shape (F,).
+
+    Returns:
+        The system, whose numbers may be negative, and the share of the variance of the compliance
+        that it accounts for [-].
+    """
+    from scipy.optimize import least_squares  # takes long to import
+
+    s = 2j * pi * np.asarray(frequency, dtype=np.complex128)
+    terms: NDArray[Any] = np.stack([np.ones_like(s), s, s**2], axis=1)
+    scale = float(np.abs(compliance).max())
+    measured: NDArray[Any] = np.asarray(compliance) / scale
+
+    def parts(values: NDArray[Any]) -> _Values:
+        return np.concatenate([values.real, values.imag])
+
+    def misfit(point: _Values) -> _Values:
+        return parts(1 / (terms @ point) - measured)
+
+    def slopes(point: _Values) -> _Values:
+        return parts(-terms / (terms @ point)[:, np.newaxis] ** 2)
+
+    # linear problems nearby: least error of stiffness, relative and carried over to compliance;
+    # the misfit can have two minima
+    weights = np.abs(measured), np.abs(measured) ** 2
+    fits = []
+    for weight in weights:
+        weighted = parts(terms * weight[:, np.newaxis])
+        start, *_ = np.linalg.lstsq(weighted, parts(weight / measured), rcond=None)
+        fits.append(least_squares(misfit, start, jac=slopes, method="lm", x_scale="jac"))
+    best = min(fits, key=lambda fit: float(fit.cost))
+    stiffness, damping, inertia = (best.x / scale).tolist()
+    explained = 1.0 - 2 * float(best.cost) / float(np.sum(np.abs(measured) ** 2))
+    return SecondOrder(stiffness, damping, inertia), explained
 
 
 def second_order_band(

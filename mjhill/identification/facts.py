@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from mjhill.identification.measures import measure
+from mjhill.identification.measures import measure, remark
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import JOINTS
 from mjhill.lab.rig import UnmeasuredError
@@ -24,7 +24,8 @@ class Fact:
         high: Upper end.
         source: Where the interval comes from.
         measured: What the joint does; None where that cannot be measured.
-        note: Why it could not; else empty.
+        note: Why it could not, or how another reading of the same measurement comes out; often
+            empty.
     """
 
     joint: str
@@ -84,6 +85,7 @@ def _fact(entry: Entry, joint: Joint) -> Fact:
     measured, note = None, ""
     try:
         measured = float(measure(entry, [joint])[0])
+        note = remark(entry, joint)
     except UnmeasuredError as reason:
         note = str(reason)
     return Fact(

@@ -22,7 +22,13 @@ from mjhill.lab.ballistic import (
     free_velocities,
     isokinetic_velocities,
 )
-from mjhill.lab.impedance import held_impedance, passive_stiffness, stiffness_slope
+from mjhill.lab.impedance import (
+    READINGS,
+    Impedance,
+    held_impedance,
+    passive_stiffness,
+    stiffness_slope,
+)
 from mjhill.lab.rig import UnmeasuredError
 from mjhill.lab.twitch import twitches
 from mjhill.literature.facts import PER_SI, Entry
@@ -121,36 +127,26 @@ def _passive_stiffness(joint: Joint, _: str, *, degrees: float) -> float:
     return passive_stiffness(joint, radians(degrees))
 
 
-def _held_stiffness(
-    joint: Joint, muscle: str, *, share: float, degrees: float, band: Sequence[float], reading: str
-) -> float:
-    low, high = band
-    held = held_impedance(joint, muscle, share=share, angle=radians(degrees), band=(low, high))
-    return held.stiffness(reading)
-
-
-def _held_damping_ratio(
+def _held(
     joint: Joint, muscle: str, *, share: float, degrees: float, band: Sequence[float]
-) -> float:
+) -> Impedance:
     low, high = band
-    held = held_impedance(joint, muscle, share=share, angle=radians(degrees), band=(low, high))
-    return held.damping_ratio
+    return held_impedance(joint, muscle, share=share, angle=radians(degrees), band=(low, high))
+
+
+def _held_stiffness(joint: Joint, muscle: str, *, reading: str, **protocol: Any) -> float:
+    return _held(joint, muscle, **protocol).stiffness(reading)
+
+
+def _held_damping_ratio(joint: Joint, muscle: str, **protocol: Any) -> float:
+    return _held(joint, muscle, **protocol).damping_ratio
 
 
 def _stiffness_slope(
-    joint: Joint,
-    muscle: str,
-    *,
-    shares: Sequence[float],
-    degrees: float,
-    band: Sequence[float],
-    reading: str,
+    joint: Joint, muscle: str, *, shares: Sequence[float], reading: str, **protocol: Any
 ) -> float:
-    low, high = band
-    angle = radians(degrees)
-    return stiffness_slope(
-        joint, muscle, shares=shares, angle=angle, band=(low, high), reading=reading
-    )
+    levels = [_held(joint, muscle, share=share, **protocol) for share in shares]
+    return stiffness_slope(levels, reading)
 
 
 def _series_stretch(joint: Joint, muscle: str, *, torque: float) -> float:
@@ -196,3 +192,29 @@ def measure(entry: Entry, joints: Sequence[Joint], memory: Memory | None = None)
     known = {} if memory is None else memory
     value = MEASURES[entry.measure](joints, entry.muscle, known, **entry.arguments)
     return np.asarray(PER_SI[entry.unit] * value)
+
+
+def remark(entry: Entry, joint: Joint) -> str:
+    """What else there is to say of a measured fact: other readings of an impedance, how good a fit.
+
+    Empty for facts that are not read from an impedance.
+
+    Args:
+        entry: The fact.
+        joint: The joint.
+    """
+    arguments = dict(entry.arguments)
+    if "band" not in arguments:
+        return ""
+    reading = arguments.pop("reading", None)
+    shares = arguments.pop("shares", None) or [arguments.pop("share")]
+    held = [_held(joint, entry.muscle, share=share, **arguments) for share in shares]
+    least = f"the second-order fit explains {min(one.explained for one in held):.0%}"
+    if reading is None:
+        return least
+    other = next(one for one in READINGS if one != reading)
+    try:
+        value = stiffness_slope(held, other) if len(held) > 1 else held[0].stiffness(other)
+    except UnmeasuredError as reason:
+        return f"{least}; {reason}"
+    return f"{other.replace('_', '-')} reading: {PER_SI[entry.unit] * value:.3g}; {least}"
