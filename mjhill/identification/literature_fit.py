@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees
 from pathlib import Path
 from typing import Any
@@ -23,8 +23,8 @@ from mjhill.literature.published import EndAngle, PassiveTorque, end_angles, pas
 from mjhill.literature.table2 import SHAPE_SPREAD, Row, rows_of
 
 # standard deviations of what the fit compares; those of facts are published
-MAGNITUDE_SPREAD = 0.02  # of MAG
-DELAY_SPREAD = 0.07  # of T1 + T2
+MAGNITUDE_SPREAD = 0.025  # of MAG
+DELAY_SPREAD = 0.1  # of T1 + T2
 PRIOR = 0.5  # weight of the priors
 _UNMEASURED = 5.0  # deviation of what cannot be measured
 _DIFFERENCE, _TOLERANCE = 1e-2, 1e-4  # for derivatives, and of the fit [standard deviations]
@@ -246,17 +246,16 @@ def from_literature(
 
     memory: Memory = {}
 
-    def residuals(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residuals(points: _Values) -> _Values:
         return evidence.residuals(free, points, memory)
 
-    solution = solve(
-        residuals,
-        len(free),
-        progress,
-        prior=PRIOR,
-        difference=_DIFFERENCE,
-        tolerance=_TOLERANCE,
-    )
+    def without_facts(points: _Values) -> _Values:
+        return replace(evidence, facts=()).residuals(free, points)
+
+    options = {"prior": PRIOR, "difference": _DIFFERENCE, "tolerance": _TOLERANCE}
+    # facts say little where nothing moves as it should
+    first = solve(without_facts, len(free), **options)
+    solution = solve(residuals, len(free), progress, start=first.deviations, **options)
     ends = intervals(residuals, solution, len(free), PRIOR)
     fitted = joint_at(start, free, solution.deviations)
     return Identified(fitted, tuple(free), tuple(solution.estimates(free, ends)))

@@ -34,6 +34,7 @@ from mjhill.lab.twitch import twitches
 from mjhill.literature.facts import PER_SI, Entry
 from mjhill.muscles.readings import series_stiffness, stretch_at
 
+_MOST_RECOIL = 0.5  # of a free velocity
 _Values = NDArray[np.float64]
 Memory = dict[str, Pulses]
 """Pulses that the last movements of a kind needed; the next search starts there."""
@@ -194,15 +195,35 @@ def measure(entry: Entry, joints: Sequence[Joint], memory: Memory | None = None)
     return np.asarray(PER_SI[entry.unit] * value)
 
 
+def _recoil(entry: Entry, joint: Joint) -> str:
+    angle = _angle(entry.arguments.get("degrees"))
+    recoil, full = (
+        float(free_velocities([joint], entry.muscle, angle=angle, excitation=u)[0])
+        for u in (0.0, 1.0)
+    )
+    said = f"passive elasticity alone moves it at {PER_SI[entry.unit] * recoil:.3g} {entry.unit}"
+    if recoil > _MOST_RECOIL * full:
+        raise UnmeasuredError(
+            f"{said}, which is more than {_MOST_RECOIL:.0%} of what {entry.muscle} does"
+        )
+    return said
+
+
 def remark(entry: Entry, joint: Joint) -> str:
     """What else there is to say of a measured fact: other readings of an impedance, how good a fit.
 
-    Empty for facts that are not read from an impedance.
+    Empty where there is nothing.
 
     Args:
         entry: The fact.
         joint: The joint.
+
+    Raises:
+        UnmeasuredError: A free velocity is that of a spring: passive elasticity alone moves the
+            joint at more than half of it.
     """
+    if entry.measure == "free_velocity":
+        return _recoil(entry, joint)
     arguments = dict(entry.arguments)
     if "band" not in arguments:
         return ""
