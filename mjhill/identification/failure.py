@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.identification.fit import Identified
-from mjhill.identification.measurement import RANGE_MARGIN, Measurement
+from mjhill.identification.measurement import RANGE_MARGIN, Measurement, largest_torque
 from mjhill.identification.movement import Prediction, make_trial
 from mjhill.joints.joint import Joint
 
@@ -58,7 +58,7 @@ def check_explained(result: Identified, joint: Joint, predict: Sequence[str | No
     ]
     if faults:
         raise FitError(
-            f"{joint.name}: the fit failed, as it explains less than {LEAST_EXPLAINED:.0%} of the "
+            f"{joint.name}: the fit failed, as it explains less than {100 * LEAST_EXPLAINED:.0f} % of the "
             f"variance of what was measured: {'; '.join(faults)}",
             result,
         )
@@ -77,7 +77,7 @@ def _fault(prediction: Prediction, joint: Joint, quantity: str | None) -> str:
             "are swapped, and the delay between excitation and movement"
         )
     else:
-        text += f" Then {share:.0%} are explained even before the fit"
+        text += f" Then {100 * share:.0f} % are explained even before the fit"
     return (
         f"{measurement.source}: {100 * prediction.explained:,.0f} % of the variance of its "
         f"{prediction.quantity} explained; {text}"
@@ -103,11 +103,10 @@ def _changes(measurement: Measurement, joint: Joint) -> Iterator[tuple[str, Meas
     torques: dict[str, NDArray[np.float64]] = {
         "has its torque the wrong sign? It is that on the joint from outside, not that of the "
         "muscles, and positive towards positive angles.": -measurement.torque,
-        "is its torque in N·mm, though its unit says N·m?": 1e-3 * measurement.torque,
         "is its torque in N·m, though its unit says N·mm?": 1e3 * measurement.torque,
     }
     for text, torque in torques.items():
-        if np.any(measurement.torque):
+        if 0 < np.abs(torque).max() <= largest_torque(joint):
             yield text, replace(measurement, torque=torque)
     if len(measurement.excitation) == 2:
         values = list(measurement.excitation.values())

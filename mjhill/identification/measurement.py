@@ -128,9 +128,9 @@ def _check_options(
 ) -> None:
     if decimal not in (None, *DECIMALS):
         raise ValueError(f"{path}: decimal must be {' or '.join(DECIMALS)}, got {decimal!r}")
-    if torque is not None and not abs(torque) <= _largest_torque(joint):
+    if torque is not None and not abs(torque) <= largest_torque(joint):
         raise ValueError(
-            f"{path}: torque must be within ±{_largest_torque(joint):g} N·m, got {torque:g}"
+            f"{path}: torque must be within ±{largest_torque(joint):g} N·m, got {torque:g}"
         )
 
 
@@ -224,7 +224,7 @@ def _no_excitation(excitation: Column, index: int) -> ValueError:
     top = "1" if excitation.factor == 1 else "100 %"
     return excitation.error(
         index,
-        f"is no excitation; it must be in [0, {top}], or outside by at most {_SLIGHTLY:.0%} of "
+        f"is no excitation; it must be in [0, {top}], or outside by at most {100 * _SLIGHTLY:.0f} % of "
         f"its span: {hint}",
     )
 
@@ -246,7 +246,7 @@ def _check_angle(angle: Column, joint: Joint) -> None:
 
 
 def _check_torque(torque: Column, joint: Joint) -> None:
-    limit = _largest_torque(joint)
+    limit = largest_torque(joint)
     index = _first(np.abs(torque.values) > limit)
     if index >= 0:
         smaller = f"write `{torque.name} [mN·m]` if it is that"
@@ -258,7 +258,8 @@ def _check_torque(torque: Column, joint: Joint) -> None:
         )
 
 
-def _largest_torque(joint: Joint) -> float:
+def largest_torque(joint: Joint) -> float:
+    """The largest external torque [N·m] that is taken as one of the joint."""
     strongest = max(muscle.max_isometric_force for muscle in joint.muscles.values())
     return _TORQUE_MARGIN * strongest
 

@@ -32,12 +32,12 @@ def source_text(result: Identified, estimate: Estimate, before: str) -> str:
     low, high = estimate.bounds
     if estimate.informed < INFORMED:
         text = (
-            f"{_UNINFORMED}{files}: {estimate.informed:.0%} from the data, so the value is that of "
+            f"{_UNINFORMED}{files}: {100 * estimate.informed:.0f} % from the data, so the value is that of "
             f"the bounds {low:g} to {high:g}"
         )
     else:
         text = (
-            f"{FITTED}{files} within {low:g} to {high:g}: {estimate.informed:.0%} from the data, "
+            f"{FITTED}{files} within {low:g} to {high:g}: {100 * estimate.informed:.0f} % from the data, "
             f"95 % interval {estimate.low:.4g} to {estimate.high:.4g}"
         )
     if before.startswith((FITTED, _UNINFORMED)) and _BOUNDS in before:
@@ -76,8 +76,8 @@ def header(results: Sequence[Identified], parameters: str | Path | None) -> str:
         unknown = [one.name for one in result.estimates if one.informed < INFORMED]
         if unknown:
             lines.append(
-                f"  of these not informed, less than {INFORMED:.0%} from the data: "
-                + ", ".join(unknown)
+                f"  of these, less than {100 * INFORMED:.0f} % from the data and so the value of "
+                f"the bounds: {', '.join(unknown)}"
             )
     start = "joints.toml, which comes with mjhill"
     if parameters:
