@@ -224,8 +224,8 @@ def _no_excitation(excitation: Column, index: int) -> ValueError:
     top = "1" if excitation.factor == 1 else "100 %"
     return excitation.error(
         index,
-        f"is no excitation; it must be in [0, {top}], or outside by at most {100 * _SLIGHTLY:.0f} % of "
-        f"its span: {hint}",
+        f"is no excitation; it must be in [0, {top}], or outside by at most "
+        f"{100 * _SLIGHTLY:.0f} % of its span: {hint}",
     )
 
 

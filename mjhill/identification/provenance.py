@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 
 from mjhill.identification.fit import Estimate, Identified
@@ -30,14 +31,14 @@ def source_text(result: Identified, estimate: Estimate, before: str) -> str:
     if len(measurements) > _NAMED:
         files += f" and {len(measurements) - _NAMED} more, see the top of the file"
     low, high = estimate.bounds
+    share = f"{100 * estimate.informed:.0f} % from the data"
     if estimate.informed < INFORMED:
         text = (
-            f"{_UNINFORMED}{files}: {100 * estimate.informed:.0f} % from the data, so the value is that of "
-            f"the bounds {low:g} to {high:g}"
+            f"{_UNINFORMED}{files}: {share}, so the value is that of the bounds {low:g} to {high:g}"
         )
     else:
         text = (
-            f"{FITTED}{files} within {low:g} to {high:g}: {100 * estimate.informed:.0f} % from the data, "
+            f"{FITTED}{files} within {low:g} to {high:g}: {share}, "
             f"95 % interval {estimate.low:.4g} to {estimate.high:.4g}"
         )
     if before.startswith((FITTED, _UNINFORMED)) and _BOUNDS in before:
@@ -52,16 +53,14 @@ def header(results: Sequence[Identified], parameters: str | Path | None) -> str:
         results: The fits.
         parameters: The file that they started from; None for the one that comes with mjhill.
     """
-    from mjhill import __version__
-
     measured = [result for result in results if result.predictions]
     if not measured:
         return ""
     lines = []
     for result in measured:
         lines.append(
-            f"{result.joint.name}: fitted by mjhill {__version__}, mjhill.identify (the command "
-            "`mjhill identify`), to"
+            f"{result.joint.name}: fitted by mjhill {version('mjhill')}, mjhill.identify (the "
+            "command `mjhill identify`), to"
         )
         for item in result.predictions:
             one = item.measurement
