@@ -59,7 +59,8 @@ def check_explained(result: Identified, joint: Joint, predict: Sequence[str | No
     if faults:
         raise FitError(
             f"{joint.name}: the fit failed, as it explains less than "
-            f"{100 * LEAST_EXPLAINED:.0f} % of the variance of what was measured: {'; '.join(faults)}",
+            f"{100 * LEAST_EXPLAINED:.0f} % of the variance of what was measured: "
+            + "; ".join(faults),
             result,
         )
 
