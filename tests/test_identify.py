@@ -76,3 +76,14 @@ def test_nothing_to_write_and_no_place_to_write_to_are_errors(hip, tmp_path):
     with pytest.raises(IsADirectoryError, match=r"hip\.png"):
         identification.write(hip, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["hip.png"]
+
+
+def test_notes_on_a_measurement_are_printed_and_written(file, tmp_path):
+    measurement = identification.read_measurement(file, mjhill.JOINTS["elbow"])
+    measurement = replace(measurement, notes=("read with a decimal comma",))
+    result = mjhill.identify("elbow", [measurement], only=["damping"])
+    assert str(result).splitlines()[-1] == f"note: {file}: read with a decimal comma"
+    report = identification.write(result, tmp_path)
+    assert report["Measurements"][0]["notes"] == ["read with a decimal comma"]
+    text = (tmp_path / "joints.toml").read_text(encoding="utf-8")
+    assert "\n#     read with a decimal comma\n" in text

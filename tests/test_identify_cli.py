@@ -103,8 +103,12 @@ def test_a_bad_cell_is_named_and_nothing_is_written(tmp_path, measurement):
         (["wing"], "unknown joint 'wing'; there are: elbow, wrist"),
         (["-d", "x.csv"], "name the one joint that was measured, got 0"),
         (["elbow", "knee", "-d", "x.csv"], "name the one joint that was measured, got 2"),
-        (["elbow", "--fit", "damping"], "--predict and --fit go with --data"),
-        (["elbow", "--predict", "angle"], "--predict and --fit go with --data"),
+        (["elbow", "--fit", "damping"], "--predict, --fit, --torque and --decimal go with --data"),
+        (["elbow", "--torque", "0"], "--predict, --fit, --torque and --decimal go with --data"),
+        (
+            ["elbow", "--predict", "angle"],
+            "--predict, --fit, --torque and --decimal go with --data",
+        ),
     ],
 )
 def test_wrong_arguments_end_in_one_line_and_leave_no_folder(arguments, message):
@@ -175,3 +179,57 @@ def test_a_joint_named_like_a_path_is_refused_and_nothing_written(tmp_path, name
     result = identify(name, "--parameters", path, "-o", tmp_path / "out")
     refused(result, f"{path}: joint {name!r}: a name must be 1 to 64 letters")
     assert names(tmp_path) == ["mine.toml"]
+
+
+@pytest.fixture
+def cells(measurement):
+    """Time, angle [rad], torque and excitations of the measurement, by title."""
+    lines = measurement.read_text(encoding="utf-8").splitlines()[1:]
+    table = [line.split(",") for line in lines]
+    wanted = ("time [s]", "elbow.angle [rad]", "elbow_flexor.u [-]", "elbow_extensor.u [-]")
+    return {title: [row[table[0].index(title)] for row in table[1:]] for title in wanted}
+
+
+def saved(path, titles, cells, delimiter=","):
+    rows = zip(*cells.values(), strict=True)
+    path.write_text("\n".join(delimiter.join(row) for row in [titles, *rows]), encoding="utf-8")
+    return path
+
+
+def test_radians_called_degrees_fail_with_the_cause_and_leave_only_the_figure(tmp_path, cells):
+    titles = ("time [s]", "angle [deg]", "flexor", "extensor")
+    path = saved(tmp_path / "mine.csv", titles, cells)
+    out = tmp_path / "out"
+    result = identify(
+        "elbow", "-d", path, "--torque", "0", "--predict", "angle", "--fit", "damping", "-o", out
+    )
+    refused(result, "the fit failed, as it explains less than 50 % of the variance", code=1)
+    assert f"{path}: -" in result.stderr
+    assert "is its angle in radians, though its unit says degrees?" in result.stderr
+    assert f"{out / 'elbow.png'} shows it, and no parameter file was written" in result.stderr
+    assert result.stdout == ""
+    assert names(out) == ["elbow.png"]
+    assert matplotlib.image.imread(out / "elbow.png").std() > 0.01
+
+
+def test_notes_on_a_file_are_printed_and_in_the_json(tmp_path, cells):
+    titles = ("Time (s)", "Angle (rad)", "flexor", "extensor")
+    commas = {title: [cell.replace(".", ",") for cell in column] for title, column in cells.items()}
+    path = saved(tmp_path / "mine.csv", titles, commas, delimiter=";")
+    arguments = ("elbow", "-d", path, "--fit", "damping", "--torque", "0", "-o", tmp_path / "out")
+    notes = ["read with a decimal comma", "torque: 0 N·m, as given"]
+    result = identify(*arguments)
+    assert result.exit_code == 0, result.stderr
+    for note in notes:
+        assert f"note: {path}: {note}" in result.stdout
+    report = json.loads(identify(*arguments, "--decimal", ",", "--json").stdout)
+    assert report["Measurements"][0]["notes"] == notes
+
+
+@pytest.mark.parametrize("option", [("--decimal", "."), ("--torque", "0")])
+def test_an_option_of_files_is_given_once_or_once_for_each(tmp_path, measurement, option):
+    arguments = [argument for file in (measurement,) * 3 for argument in ("-d", file)]
+    result = identify("elbow", *arguments, *option, *option, "-o", tmp_path / "out")
+    message = f"{option[0][2:]} must be given once, or once for each of the 3 measurements, got 2"
+    refused(result, message)
+    assert names(tmp_path / "out") == []

@@ -7,10 +7,17 @@ from typing import Any
 
 import click
 
-from mjhill.cli.printing import json_option, print_json, print_paths, print_table, progress_bar
+from mjhill.cli.printing import (
+    json_option,
+    print_json,
+    print_line,
+    print_paths,
+    print_table,
+    progress_bar,
+)
 from mjhill.files import check_writable
 
-_HIDDEN = ("note", "source", "muscle")  # from tables on the screen; the JSON file has them
+_HIDDEN = ("note", "notes", "source", "muscle")  # from tables on the screen; the JSON file has them
 
 
 @click.command()
@@ -26,6 +33,16 @@ _HIDDEN = ("note", "source", "muscle")  # from tables on the screen; the JSON fi
 )  # fmt: skip
 @click.option("--fit", "only", multiple=True, metavar="NAME", help="Fit only this parameter.")
 @click.option(
+    "--torque", multiple=True, type=float, metavar="N·m",
+    help="Constant external torque, for data without a column of it; once for all or once for "
+    "each.",
+)  # fmt: skip
+@click.option(
+    "--decimal", multiple=True, type=click.Choice([".", ","]),
+    help="Sign between a number's digits in the data, once for all or once for each; by default "
+    "what the cells say.",
+)  # fmt: skip
+@click.option(
     "--parameters", type=click.Path(path_type=Path),
     help="Parameter file with bounds; by default the one that comes with mjhill.",
 )  # fmt: skip
@@ -39,6 +56,8 @@ def identify(
     data: tuple[Path, ...],
     predict: tuple[str, ...],
     only: tuple[str, ...],
+    torque: tuple[float, ...],
+    decimal: tuple[str, ...],
     parameters: Path | None,
     output: Path,
     as_json: bool,
@@ -47,19 +66,30 @@ def identify(
 
     Without --data: to Table 2 of Winters & Stark (1987) and published passive torques and
     ranges of motion, for all joints if none is named. With --data: to measurements of one joint,
-    CSV files with columns time [s], angle [rad or deg], torque [N·m] and one of each muscle's
-    name [0 to 1]. The torque is all that acts on the joint from outside, gravity too, and is
-    positive towards positive angles.
+    CSV files with columns time [s], angle [deg], torque [N·m] and one of each muscle's name
+    [0 to 1 or %]; units may be others, and without one they are s, rad, N·m and 0 to 1. Lines
+    about the device may come first. The torque is all that acts on the joint from outside,
+    gravity too, and is positive towards positive angles.
+
+    A fit that explains less than half of the variance of a measurement has failed: the exit
+    code is 1, and only the figure is written, of measured beside predicted.
     """
     from mjhill.identification import write
 
     if data and len(joints) != 1:
         raise ValueError(f"name the one joint that was measured, got {len(joints)}")
-    if not data and (predict or only):
-        raise ValueError("--predict and --fit go with --data; the literature is fitted whole")
+    if not data and (predict or only or torque or decimal):
+        raise ValueError(
+            "--predict, --fit, --torque and --decimal go with --data; the literature is fitted "
+            "whole"
+        )
     names = _known(joints, parameters)
     files = _files(names, output, measured=bool(data))
-    results = _fitted(names, data, predict, only, parameters)
+    if data:
+        options = {"predict": predict or None, "torque": torque or None, "decimal": decimal or None}
+        results = [_measured(names[0], data, files, only=only, parameters=parameters, **options)]
+    else:
+        results = _from_literature(names, parameters)
     what = "writing" if data else "measuring what the fit did not use"
     with progress_bar(what) as progress:
         report = write(results, output, parameters=parameters, progress=progress)
@@ -91,33 +121,31 @@ def _files(names: list[str], output: Path, *, measured: bool) -> dict[str, Path]
     return files
 
 
-def _fitted(
-    names: list[str],
-    data: tuple[Path, ...],
-    predict: tuple[str, ...],
-    only: tuple[str, ...],
-    parameters: Path | None,
-) -> list[Any]:
+def _from_literature(names: list[str], parameters: Path | None) -> list[Any]:
     from mjhill import identification
     from mjhill.identification.literature_fit import check_evidence
 
-    if not data:
-        check_evidence(names, parameters)
+    check_evidence(names, parameters)
     results = []
     for index, name in enumerate(names):
-        of = f", {index + 1} of {len(names)}" if not data else ""
-        with progress_bar(f"fitting {name}{of}") as progress:
-            results.append(
-                identification.identify(
-                    name,
-                    data,
-                    predict=predict or None,
-                    only=only,
-                    parameters=parameters,
-                    progress=progress,
-                )
-            )
+        with progress_bar(f"fitting {name}, {index + 1} of {len(names)}") as progress:
+            results.append(identification.identify(name, parameters=parameters, progress=progress))
     return results
+
+
+def _measured(name: str, data: tuple[Path, ...], files: dict[str, Path], **options: Any) -> Any:
+    """A fit to measurements; the figure of one that failed is written."""
+    from mjhill import identification
+    from mjhill.identification.report import plot_predictions
+
+    try:
+        with progress_bar(f"fitting {name}") as progress:
+            return identification.identify(name, data, progress=progress, **options)
+    except identification.FitError as failure:
+        plot_predictions(name, failure.result.predictions, files[name])
+        raise RuntimeError(
+            f"{failure}; {files[name]} shows it, and no parameter file was written"
+        ) from failure
 
 
 def _print(report: dict[str, Any]) -> None:
@@ -125,3 +153,6 @@ def _print(report: dict[str, Any]) -> None:
         shown = [{k: v for k, v in row.items() if k not in _HIDDEN} for row in rows]
         if shown:
             print_table(shown, False, title=title)
+    for row in report.get("Measurements", []):
+        for note in row["notes"]:
+            print_line(f"note: {row['measurement']}: {note}")

@@ -1,5 +1,6 @@
 """Parameters of a joint fitted to the literature, or to measurements of one person."""
 
+from mjhill.identification.failure import FitError as FitError
 from mjhill.identification.fit import Estimate as Estimate
 from mjhill.identification.fit import Identified as Identified
 from mjhill.identification.joint_fit import identify as identify

@@ -454,10 +454,16 @@ class Identified:
     predictions: tuple[Any, ...] = ()
 
     def __str__(self) -> str:
-        """A line for each parameter: value, interval of 95 % confidence, share from the data."""
+        """A line for each parameter: value, interval of 95 % confidence, share from the data.
+
+        Then one for each note on a measurement.
+        """
         lines = [f"{self.joint.name}, fitted: value, 95 % interval, share from the data"]
         for one in self.estimates:
             lines.append(
                 f"{one.name}: {one.value:.4g}, {one.low:.3g} to {one.high:.3g}, {one.informed:.0%}"
             )
+        for prediction in self.predictions:
+            measurement = prediction.measurement
+            lines += [f"note: {measurement.source}: {note}" for note in measurement.notes]
         return "\n".join(lines)

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+from mjhill.identification.failure import check_explained
 from mjhill.identification.fit import Identified
 from mjhill.identification.literature_fit import from_literature
 from mjhill.identification.measurement import Measurement, read_measurement
 from mjhill.identification.movement import from_measurements
+from mjhill.joints.joint import Joint
 from mjhill.joints.reader import read_joints
 
 
@@ -20,6 +23,8 @@ def identify(
     predict: str | Sequence[str] | None = None,
     only: Sequence[str] = (),
     parameters: str | Path | None = None,
+    torque: float | Sequence[float] | None = None,
+    decimal: str | Sequence[str] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Identified:
     """Fit the parameters of a joint within their bounds, and say how sure each is.
@@ -35,6 +40,10 @@ def identify(
             torque where the joint is held still, angle elsewhere.
         only: Names of the parameters to fit; by default all that have bounds.
         parameters: Parameter file with bounds; by default the one that comes with mjhill.
+        torque: A constant external torque [N·m], for files that have no column of it; once for
+            all or once for each.
+        decimal: Sign between a number's digits in the files, ``.`` or ``,``, once for all or once
+            for each; by default what the cells say.
         progress: Called with the share done, 0 to 1.
 
     Returns:
@@ -44,20 +53,56 @@ def identify(
     Raises:
         ValueError: The joint is unknown, a measurement cannot be read, an option does not go
             with the others, or nothing published on the joint comes with mjhill.
+        FitError: The fit explains less than half of the variance of a measurement.
         RuntimeError: The fit did not settle.
     """
     known = read_joints(parameters)
     if joint not in known:
         raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(known)}")
     if not measurements:
-        if predict or only:
-            raise ValueError("predict and only need measurements; give them")
+        if predict or only or torque is not None or decimal:
+            raise ValueError("predict, only, torque and decimal need measurements; give them")
         return from_literature(joint, parameters, progress)
-    read = [
-        one if isinstance(one, Measurement) else read_measurement(Path(one), known[joint])
-        for one in measurements
-    ]
+    read = _read(measurements, known[joint], torque, decimal)
     result, predictions = from_measurements(
         joint, read, predict=predict, only=only, parameters=parameters, progress=progress
     )
-    return replace(result, predictions=tuple(predictions))
+    result = replace(result, predictions=tuple(predictions))
+    check_explained(result, known[joint], _each("predict", predict, len(read)))
+    return result
+
+
+def _read(
+    measurements: Sequence[str | Path | Measurement],
+    joint: Joint,
+    torque: float | Sequence[float] | None,
+    decimal: str | Sequence[str] | None,
+) -> list[Measurement]:
+    count = len(measurements)
+    options = zip(_each("torque", torque, count), _each("decimal", decimal, count), strict=True)
+    read = []
+    for one, (constant, sign) in zip(measurements, options, strict=True):
+        if not isinstance(one, Measurement):
+            read.append(read_measurement(Path(one), joint, torque=constant, decimal=sign))
+            continue
+        if constant is not None or sign is not None:
+            raise ValueError(
+                f"{one.source}: torque and decimal are about files, and this measurement has been "
+                "read already; leave them out"
+            )
+        read.append(one)
+    return read
+
+
+def _each(name: str, given: Any, count: int) -> list[Any]:
+    """An option for each measurement, given not at all, once for all or once for each."""
+    if given is None:
+        return [None] * count
+    several = isinstance(given, Sequence) and not isinstance(given, str)
+    options = list(given) if several else [given]
+    if len(options) not in (1, count):
+        raise ValueError(
+            f"{name} must be given once, or once for each of the {count} measurements, got "
+            f"{len(options)}: {', '.join(map(str, options))}"
+        )
+    return options * (count if len(options) == 1 else 1)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.identification.columns import Column, Columns, read_columns, read_table
+from mjhill.identification.columns import DECIMALS, Column, Columns, read_columns
 from mjhill.joints.joint import Joint
 
 _LEAST_SAMPLES = 50
@@ -18,8 +18,9 @@ _LEAST_DURATION = 0.1  # [s], two of the slowest time constants of a muscle
 _COARSE_INTERVAL = 0.2  # [s], from here on samples step over the rise of a muscle
 _FINE_INTERVAL = 1e-5  # [s], below it a movement has no measurable change
 _LEAST_MOVEMENT = 1e-6  # [rad]
-_RANGE_MARGIN = 1.0  # [rad] past the range of motion
+RANGE_MARGIN = 1.0  # [rad] past the range of motion
 _TORQUE_MARGIN = 10.0  # external torque over the strongest muscle
+_SLIGHTLY = 0.05  # of the span of an excitation, by which it may be below 0 or above 1
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,8 @@ class Measurement:
         angle: Angle of the joint [rad], shape (T,).
         torque: External torque on the joint, gravity included [N·m], shape (T,), positive towards
             positive angles.
+        digest: SHA-256 of the file in hexadecimal digits; empty where there is none.
+        notes: What was done to the numbers of the file, for people.
     """
 
     source: str
@@ -40,6 +43,8 @@ class Measurement:
     excitation: Mapping[str, NDArray[np.float64]]
     angle: NDArray[np.float64]
     torque: NDArray[np.float64]
+    digest: str = ""
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check shapes.
@@ -60,45 +65,83 @@ class Measurement:
         return len(self.time)
 
 
-def read_measurement(path: str | Path, joint: Joint) -> Measurement:
+def read_measurement(
+    path: str | Path, joint: Joint, *, torque: float | None = None, decimal: str | None = None
+) -> Measurement:
     """Read a measurement of a joint from a CSV file.
 
-    The file may start with a line ``# ...``; then come a header of ``name`` or ``name [unit]``
-    and rows of numbers, separated by commas, semicolons or tabs. The columns, in any order:
+    Lines about the device may come first; then a header, maybe a row of units, and rows of
+    numbers, separated by commas, semicolons or tabs. A title is a name, maybe with a unit:
+    ``Angle [deg]``, ``angle (deg)``, ``angle/deg``, ``angle_deg``. Letters may be large or small.
+    The columns, in any order:
 
-    - ``time`` [s, ms];
-    - ``angle`` or ``<joint>.angle`` [rad, deg, °];
-    - ``torque`` or ``<joint>.applied`` [N·m, Nm, N m, N.m, mN·m, N·mm];
-    - ``<muscle>`` or ``<muscle>.u`` for each muscle of the joint [-, 1, none, %]; or one
-      ``excitation`` that drives the first muscle of the joint, while the others are at rest.
+    - ``time`` or ``t`` [s];
+    - ``angle``, ``position`` or ``<joint>.angle`` [rad];
+    - ``torque`` or ``<joint>.applied`` [N·m], unless ``torque`` is given;
+    - ``<muscle>`` or ``<muscle>.u`` for each muscle of the joint [-]; or one ``excitation`` that
+      drives the first muscle of the joint, while the others are at rest. The joint's name may be
+      left out, and ``EMG`` added.
 
-    No unit means the first of those listed. Other columns are ignored, so a ``Recording`` with
-    an applied torque, saved as ``.csv``, is a measurement.
+    A column may have any unit of its quantity; without one it has the unit in brackets. Other
+    columns are ignored, so a ``Recording`` with an applied torque, saved as ``.csv``, is a
+    measurement. Rows at the ends that lack numbers are left out, and an excitation that is off
+    its limits by at most 5 % of its span is clipped; ``Measurement.notes`` says so.
+
+    Args:
+        path: The file.
+        joint: The joint.
+        torque: A constant external torque [N·m], for a file that has no column of it.
+        decimal: Sign between a number's digits, ``.`` or ``,``; by default what the cells say.
 
     Raises:
         FileNotFoundError: There is no such file.
         ValueError: The file is not such a table, or its numbers cannot be those of the joint;
             the message names the file, the row (line of the file, from 1) and the column.
     """
-    columns = read_columns(read_table(path), joint)
+    _check_options(path, joint, torque, decimal)
+    columns = read_columns(path, joint, with_torque=torque is None, decimal=decimal)
     _check_ascending(columns.time)
     _check_sampling(columns.time)
-    for column in columns.excitation.values():
-        _check_excitation(column)
+    notes = [*columns.notes, *_assumed(columns)]
+    excitation = {}
+    for muscle, column in columns.excitation.items():
+        excitation[muscle], clipped = _clipped(column)
+        notes += clipped
     _check_angle(columns.angle, joint)
-    _check_torque(columns.torque, joint)
+    if columns.torque:
+        _check_torque(columns.torque, joint)
     _check_change(columns)
     rest = np.zeros_like(columns.time.values)
     return Measurement(
         source=str(path),
         time=columns.time.values,
-        excitation={
-            muscle: columns.excitation[muscle].values if muscle in columns.excitation else rest
-            for muscle in joint.muscles
-        },
+        excitation={muscle: excitation.get(muscle, rest) for muscle in joint.muscles},
         angle=columns.angle.values,
-        torque=columns.torque.values,
+        torque=columns.torque.values if columns.torque else rest + (torque or 0.0),
+        digest=columns.digest,
+        notes=tuple(notes if torque is None else [*notes, f"torque: {torque:g} N·m, as given"]),
     )
+
+
+def _check_options(
+    path: str | Path, joint: Joint, torque: float | None, decimal: str | None
+) -> None:
+    if decimal not in (None, *DECIMALS):
+        raise ValueError(f"{path}: decimal must be {' or '.join(DECIMALS)}, got {decimal!r}")
+    if torque is not None and not abs(torque) <= largest_torque(joint):
+        raise ValueError(
+            f"{path}: torque must be within ±{largest_torque(joint):g} N·m, got {torque:g}"
+        )
+
+
+def _assumed(columns: Columns) -> list[str]:
+    """What the units were taken for, where a wrong guess could pass."""
+    guessed = [column for column in (columns.angle, columns.torque) if column]
+    return [
+        f"{column.title!r} has no unit: taken as {column.unit}"
+        for column in guessed
+        if not column.stated
+    ]
 
 
 def _check_ascending(time: Column) -> None:
@@ -148,19 +191,42 @@ def _check_sampling(time: Column) -> None:
         )
 
 
-def _check_excitation(excitation: Column) -> None:
+def _clipped(excitation: Column) -> tuple[NDArray[np.float64], list[str]]:
+    """An excitation within 0 to 1, and notes on what was slightly off.
+
+    Raises:
+        ValueError: It is further off.
+    """
     values = excitation.values
-    index = _first((values < 0) | (values > 1))
-    if index < 0:
-        return
-    if values[index] < 0:
+    slightly = _SLIGHTLY * float(np.ptp(values))
+    index = _first((values < -slightly) | (values > 1 + slightly))
+    if index >= 0:
+        raise _no_excitation(excitation, index)
+    notes = []
+    for off, limit in ((values < 0, "below 0"), (values > 1, "above 1")):
+        if off.any():
+            worst = int(np.argmax(np.abs(values - 0.5) * off))
+            samples = f"{off.sum()} sample{'s' if off.sum() > 1 else ''}"
+            notes.append(
+                f"{excitation.title!r}: {samples} {limit} clipped, at most "
+                f"{excitation.written(worst)}"
+            )
+    return np.clip(values, 0.0, 1.0), notes
+
+
+def _no_excitation(excitation: Column, index: int) -> ValueError:
+    if excitation.values[index] < 0:
         hint = "remove the offset of the signal, and rectify it"
     elif excitation.factor == 1:
-        hint = f"percent? write `{excitation.name} [%]`"
+        hint = f"percent? write `{excitation.name} [%]`; or divide by that of a maximal effort"
     else:
         hint = "divide by the excitation of a maximal effort"
     top = "1" if excitation.factor == 1 else "100 %"
-    raise excitation.error(index, f"is no excitation; it must be in [0, {top}]: {hint}")
+    return excitation.error(
+        index,
+        f"is no excitation; it must be in [0, {top}], or outside by at most "
+        f"{100 * _SLIGHTLY:.0f} % of its span: {hint}",
+    )
 
 
 def _check_angle(angle: Column, joint: Joint) -> None:
@@ -169,19 +235,18 @@ def _check_angle(angle: Column, joint: Joint) -> None:
     index = _first(np.abs(angle.values) > 2 * math.pi)
     if index >= 0:
         raise angle.error(index, f"is more than a full turn; it must be within 2 pi rad: {hint}")
-    index = _first((angle.values < low - _RANGE_MARGIN) | (angle.values > high + _RANGE_MARGIN))
+    index = _first((angle.values < low - RANGE_MARGIN) | (angle.values > high + RANGE_MARGIN))
     if index >= 0:
         raise angle.error(
             index,
-            f"is impossible for the {joint.name}; it must be within {_RANGE_MARGIN:g} rad of its "
+            f"is impossible for the {joint.name}; it must be within {RANGE_MARGIN:g} rad of its "
             f"range, {low:g} to {high:g} rad ({math.degrees(low):.0f} to {math.degrees(high):.0f} "
             f"deg): {hint}, or check its sign and zero",
         )
 
 
 def _check_torque(torque: Column, joint: Joint) -> None:
-    strongest = max(muscle.max_isometric_force for muscle in joint.muscles.values())
-    limit = _TORQUE_MARGIN * strongest
+    limit = largest_torque(joint)
     index = _first(np.abs(torque.values) > limit)
     if index >= 0:
         smaller = f"write `{torque.name} [mN·m]` if it is that"
@@ -193,8 +258,14 @@ def _check_torque(torque: Column, joint: Joint) -> None:
         )
 
 
+def largest_torque(joint: Joint) -> float:
+    """The largest external torque [N·m] that is taken as one of the joint."""
+    strongest = max(muscle.max_isometric_force for muscle in joint.muscles.values())
+    return _TORQUE_MARGIN * strongest
+
+
 def _check_change(columns: Columns) -> None:
-    inputs = [columns.torque, *columns.excitation.values()]
+    inputs = [column for column in (columns.torque, *columns.excitation.values()) if column]
     still = np.ptp(columns.angle.values) < _LEAST_MOVEMENT
     if still and all(np.ptp(column.values) == 0 for column in inputs):
         titles = ", ".join(repr(column.title) for column in inputs)

@@ -18,6 +18,7 @@ from mjhill.identification.facts import Fact, facts
 from mjhill.identification.fit import Identified
 from mjhill.identification.literature_fit import Evidence, evidence_on, published_rows, step_rows
 from mjhill.identification.movement import Prediction
+from mjhill.identification.provenance import header, source_text
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import parameter_file, read_joints
 from mjhill.simulate.reference import plant_torque
@@ -148,6 +149,7 @@ def prediction_rows(predictions: Sequence[Prediction]) -> list[dict[str, Any]]:
                 "rms error": degrees(item.error) if angle else item.error,
                 "unit": "°" if angle else "N·m",
                 "variance explained [%]": 100 * item.explained,
+                "notes": list(item.measurement.notes),
             }
         )
     return rows
@@ -364,12 +366,16 @@ def _save(figure: Any, path: str | Path) -> None:
 def parameter_text(results: Iterable[Identified], parameters: str | Path | None = None) -> str:
     """The text of a parameter file with the values of some joints replaced by fitted ones.
 
+    A value that was fitted to measurements gets a source that says so, and comment lines at the
+    top say how it was made.
+
     Args:
         results: The fitted joints.
         parameters: The file to start from; by default the one that comes with mjhill.
     """
     import tomlkit
 
+    results = list(results)
     document = tomlkit.parse(Path(parameters or parameter_file()).read_text(encoding="utf-8"))
     for result in results:
         for free, estimate in zip(result.free, result.estimates, strict=True):
@@ -377,7 +383,10 @@ def parameter_text(results: Iterable[Identified], parameters: str | Path | None 
             for key in free.path:
                 entry = entry[key]  # type: ignore[index]
             entry["value"] = rounded(estimate.value, free.low, free.high)  # type: ignore[index]
-    return tomlkit.dumps(document)
+            if result.predictions:
+                before = str(entry["source"])  # type: ignore[index]
+                entry["source"] = source_text(result, estimate, before)  # type: ignore[index]
+    return header(results, parameters) + tomlkit.dumps(document)
 
 
 def write_parameters(

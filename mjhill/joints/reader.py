@@ -21,6 +21,7 @@ _DATA = Path(__file__).parent / "joints.toml"
 _Made = TypeVar("_Made", Joint, Muscle, Passive)
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,63}")  # becomes a file's name
 _ENTRY = ("value", "source", "bounds")
+FITTED = "fitted to "  # starts the source of a value that was fitted to measurements
 _LONGEST = 1_000_000  # of a parameter file [byte]
 _ANGLES = (-10.0, 10.0)  # that a joint can have [rad]
 _GEARS = (1e-6, 1e6)  # size of a gear
@@ -176,6 +177,8 @@ def _source(entry: Mapping[str, Any], what: str) -> str:
     low, high = _pair(entry["bounds"], f"{what}: bounds")
     if not low < high:
         raise ValueError(f"{what} must have ascending bounds, got {_shown([low, high])}")
+    if source.startswith(FITTED):
+        return source
     return f"fitted by mjhill identify within {low:g} to {high:g}: {source}"
 
 
