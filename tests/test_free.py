@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.identification.fit import DEVIATIONS, Free, free_parameters, joint_at, value_of
+from mjhill.identification.free import DEVIATIONS, Free, free_parameters, joint_at, value_of
 from mjhill.joints.reader import parameter_file
 
 POSITIVE = Free(("muscles", "puller", "max_velocity"), 2.0, 8.0)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.identification.fit import Estimate, Identified, free_parameters, value_of
+from mjhill.identification.fit import Estimate, Identified
+from mjhill.identification.free import free_parameters, value_of
 from mjhill.identification.literature_fit import from_literature, published_rows, step_rows
 from mjhill.identification.report import parameter_text, rounded, write_parameters
 from mjhill.joints.reader import parameter_file, read_joints

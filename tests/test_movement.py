@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.identification.fit import value_of
+from mjhill.identification.free import value_of
 from mjhill.identification.measurement import Measurement, read_measurement
 from mjhill.identification.movement import from_measurements
 from mjhill.lab.rig import at_rest, build_rig, record_run

@@ -13,7 +13,7 @@ import mjhill
 from mjhill.benchmarks import accuracy
 from mjhill.cli import main
 from mjhill.identification.facts import facts
-from mjhill.identification.fit import free_parameters, value_of
+from mjhill.identification.free import free_parameters, value_of
 from mjhill.identification.literature_fit import published_rows
 from mjhill.identification.report import brief
 

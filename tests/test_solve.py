@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from mjhill.identification import fit as solver
-from mjhill.identification.fit import Free, solve
+from mjhill.identification.fit import solve
+from mjhill.identification.free import Free
 
 FREE = [Free((name,), 1.0, 9.0) for name in ("first", "second", "third")]
 

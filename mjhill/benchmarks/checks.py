@@ -21,7 +21,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.benchmarks.fuzz import quiet
 from mjhill.benchmarks.fuzz.draws import Random, log_uniform
 from mjhill.benchmarks.fuzz.outcomes import impossible
 from mjhill.benchmarks.result import Result
@@ -31,6 +30,7 @@ from mjhill.benchmarks.sweep.solutions import at_start, inputs_of, run, use
 from mjhill.engine.checks import check_model
 from mjhill.engine.install import installed
 from mjhill.engine.layout import muscle_names, read_muscle, write_muscle
+from mjhill.lab.batch import quiet
 from mjhill.muscles import hill_of
 from mjhill.simulate.signals import as_signal, pulse
 

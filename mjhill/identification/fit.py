@@ -2,156 +2,16 @@
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import exp, log
-from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import mujoco.minimize
 import numpy as np
 from numpy.typing import NDArray
 
+from mjhill.identification.free import DEVIATIONS, Free
 from mjhill.joints.joint import Joint
-from mjhill.joints.reader import parameter_file, read_joints
-
-DEVIATIONS = 2.0  # from the middle of the bounds to either
-_NOT_FITTED = ("gear", "range", "home_angle")  # conventions, which no data determine
-
-
-@dataclass(frozen=True)
-class Free:
-    """One free parameter.
-
-    Attributes:
-        path: Keys of its entry in a joint's table, such as
-            ``("muscles", "elbow_flexor", "max_velocity")``.
-        low: Lower bound, in the parameter's unit.
-        high: Upper bound.
-        mirrors: Paths of parameters that have the same value, and 1, or -1 for the opposite one.
-    """
-
-    path: tuple[str, ...]
-    low: float
-    high: float
-    mirrors: tuple[tuple[tuple[str, ...], float], ...] = ()
-
-    @property
-    def name(self) -> str:
-        """Its name in tables: ``elbow_flexor.max_velocity``, ``passive.k1_pos``, ``damping``."""
-        return ".".join(self.path[1:] if self.path[0] == "muscles" else self.path)
-
-    def value(self, deviation: float) -> float:
-        """The value [the parameter's unit] some standard deviations from the middle."""
-        share = 0.5 + 0.5 * deviation / DEVIATIONS
-        if self.low > 0:
-            value = exp((1 - share) * log(self.low) + share * log(self.high))
-        else:
-            value = (1 - share) * self.low + share * self.high
-        return min(max(value, self.low), self.high)
-
-    def deviation(self, value: float) -> float:
-        """Standard deviations of a value from the middle: ``value`` inverted."""
-        if self.low > 0:
-            share = log(value / self.low) / log(self.high / self.low)
-        else:
-            share = (value - self.low) / (self.high - self.low)
-        return DEVIATIONS * (2 * share - 1)
-
-
-def free_parameters(joint: str, path: str | Path | None = None) -> list[Free]:
-    """The free parameters of a joint, in the order of the parameter file.
-
-    Args:
-        joint: Its name.
-        path: The parameter file; by default the one that comes with mjhill.
-
-    Raises:
-        ValueError: The file is not in order, there is no such joint, bounds are not two ascending
-            numbers that the value lies between or those of what cannot be fitted, or there are
-            none.
-    """
-    known = read_joints(path)
-    if joint not in known:
-        raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(known)}")
-    tables = tomllib.loads(Path(path or parameter_file()).read_text(encoding="utf-8"))
-    found = list(_entries(tables[joint], ()))
-    if tables[joint].get("symmetric"):
-        found = list(_tied(found, list(known[joint].muscles)))
-    for free, value in found:
-        if free.path[-1] in _NOT_FITTED:
-            raise ValueError(f"{joint}: {free.name} cannot be fitted; remove its bounds")
-        if not free.low < free.high or not free.low <= value <= free.high:
-            raise ValueError(
-                f"{joint}: {free.name} must have ascending bounds about its value {value:g}, "
-                f"got [{free.low:g}, {free.high:g}]"
-            )
-    if not found:
-        raise ValueError(f"{joint}: no parameter has bounds, so there is none to fit; add some")
-    return [free for free, _ in found]
-
-
-def _entries(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[tuple[Free, float]]:
-    for name, entry in table.items():
-        if not isinstance(entry, dict):
-            continue
-        if "bounds" in entry:
-            low, high = entry["bounds"]
-            yield Free((*path, name), float(low), float(high)), entry["value"]
-        elif "value" not in entry:
-            yield from _entries(entry, (*path, name))
-
-
-def _tied(
-    entries: Iterable[tuple[Free, float]], muscles: Sequence[str]
-) -> Iterator[tuple[Free, float]]:
-    """The parameters of a symmetric joint: those of its first muscle and positive side."""
-    first, second = muscles
-    for free, value in entries:
-        name = free.path[-1]
-        if second in free.path or name.endswith("_neg"):
-            continue
-        if first in free.path:
-            other = tuple(second if key == first else key for key in free.path)
-            yield replace(free, mirrors=((other, -1.0 if "postures" in other else 1.0),)), value
-        elif name.endswith("_pos"):
-            other = (*free.path[:-1], name.replace("_pos", "_neg"))
-            yield replace(free, mirrors=((other, 1.0),)), value
-        else:
-            yield free, value
-
-
-def joint_at(joint: Joint, free: Sequence[Free], deviations: NDArray[np.float64]) -> Joint:
-    """A joint with its free parameters at some deviations, shape (P,), from their middles."""
-    values: dict[tuple[str, ...], float] = {}
-    for item, z in zip(free, deviations.tolist(), strict=True):
-        values[item.path] = item.value(z)
-        values |= {path: sign * values[item.path] for path, sign in item.mirrors}
-
-    def under(*path: str) -> dict[str, Any]:
-        return {key[-1]: value for key, value in values.items() if key[:-1] == path}
-
-    muscles = {
-        name: replace(muscle, **under("muscles", name)) for name, muscle in joint.muscles.items()
-    }
-    return replace(
-        joint,
-        **under(),
-        passive=replace(joint.passive, **under("passive")),
-        muscles=MappingProxyType(muscles),
-        postures=MappingProxyType({**joint.postures, **under("postures")}),
-    )
-
-
-def value_of(joint: Joint, free: Free) -> float:
-    """The value that a free parameter has in a joint, in the parameter's unit."""
-    node: Any = joint
-    for key in free.path:
-        node = node[key] if isinstance(node, Mapping) else getattr(node, key)
-    return float(node)
-
 
 _DIFFERENCE = 1e-5  # of a parameter, in its standard deviations, for derivatives
 _STIFFEST = 1e4  # regularisation at which a fit that finds nothing better ends
@@ -175,7 +35,8 @@ class Estimate:
         high: Upper end.
         bounds: What physiology allows.
         informed: Share of the prior's variance that the data took away, 0 to 1, from the width of
-            the interval: near 0 the value is the prior's, near 1 the data's.
+            the interval: near 0 the value is the prior's, near 1 the data's. The variance of a
+            prior of weight w is that of the bounds over w².
         at_bound: Whether it ended on a bound.
     """
 
@@ -211,7 +72,10 @@ class Solution:
         return np.stack([self.deviations - reach, self.deviations + reach], axis=1)
 
     def estimates(
-        self, free: Sequence[Free], ends: NDArray[np.float64] | None = None
+        self,
+        free: Sequence[Free],
+        ends: NDArray[np.float64] | None = None,
+        prior: float = 1.0,
     ) -> list[Estimate]:
         """The parameters with their confidence.
 
@@ -219,18 +83,19 @@ class Solution:
             free: The parameters; what was fitted besides, such as where a trial starts, comes
                 after them in the solution.
             ends: Ends of their intervals in deviations, by default those of the covariance.
+            prior: Weight that the priors had.
         """
         known = self.ends if ends is None else ends
         return [
-            _estimate(item, z, low, high)
+            _estimate(item, z, low, high, prior)
             for item, z, (low, high) in zip(
                 free, self.deviations.tolist(), known.tolist(), strict=False
             )
         ]
 
 
-def _estimate(free: Free, deviation: float, low: float, high: float) -> Estimate:
-    spread = (high - low) / (2 * CONFIDENT)
+def _estimate(free: Free, deviation: float, low: float, high: float, prior: float) -> Estimate:
+    spread = prior * (high - low) / (2 * CONFIDENT)
     return Estimate(
         free.name,
         free.value(deviation),
@@ -333,9 +198,7 @@ class _Place:
         return 0.5 * float(self.found @ self.found)
 
 
-def intervals(
-    residuals: Residuals, solution: Solution, count: int, prior: float = 1.0
-) -> _Values:
+def intervals(residuals: Residuals, solution: Solution, count: int, prior: float = 1.0) -> _Values:
     """Ends of the intervals of 95 % of the first parameters, in deviations, shape (count, 2).
 
     Never narrower than those of the covariance.
@@ -446,12 +309,16 @@ class Identified:
         estimates: Their values and confidence, in the same order.
         predictions: What the fitted joint does in each measurement, see ``Prediction``; none for
             a fit to the literature.
+        pinned: Parameters that were fixed, and their values.
+        start: How the joint started a step of Table 2, ``relaxed`` or ``held``.
     """
 
     joint: Joint
     free: tuple[Free, ...]
     estimates: tuple[Estimate, ...]
     predictions: tuple[Any, ...] = ()
+    pinned: tuple[tuple[Free, float], ...] = ()
+    start: str = "relaxed"
 
     def __str__(self) -> str:
         """A line for each parameter: value, interval of 95 % confidence, share from the data.

@@ -9,15 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.identification.fit import (
-    Free,
-    Identified,
-    Solution,
-    free_parameters,
-    intervals,
-    joint_at,
-    solve,
-)
+from mjhill.identification.fit import Identified, Solution, intervals, solve
+from mjhill.identification.free import Free, free_parameters, joint_at
 from mjhill.identification.measurement import Measurement
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import read_joints

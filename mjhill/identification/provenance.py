@@ -46,6 +46,17 @@ def source_text(result: Identified, estimate: Estimate, before: str) -> str:
     return text + _BOUNDS + before
 
 
+def pinned_text(before: str, bounds: Sequence[float]) -> str:
+    """The source of a value that was fixed.
+
+    Args:
+        before: The source that it had while it was free.
+        bounds: The bounds that it had.
+    """
+    low, high = bounds
+    return f"fixed by mjhill identify, not fitted within {low:g} to {high:g}: {before}"
+
+
 def header(results: Sequence[Identified], parameters: str | Path | None) -> str:
     """Comment lines about all fits to measurements of a parameter file; none without such fits.
 

@@ -4,26 +4,24 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from math import degrees
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from mjhill.analysis.second_order import step_response
-from mjhill.draw.bellies import MUSCLE_COLOURS
-from mjhill.draw.plot import take_literally
 from mjhill.files import check_writable, replacing
-from mjhill.identification.facts import Fact, facts
+from mjhill.identification.facts import facts
 from mjhill.identification.fit import Identified
-from mjhill.identification.literature_fit import Evidence, evidence_on, published_rows, step_rows
-from mjhill.identification.movement import Prediction
-from mjhill.identification.provenance import header, source_text
+from mjhill.identification.plots import plot_literature, plot_predictions
+from mjhill.identification.provenance import header, pinned_text, source_text
+from mjhill.identification.rows import (
+    estimate_rows,
+    fact_rows,
+    prediction_rows,
+    published_rows,
+    step_rows,
+)
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import parameter_file, read_joints
-from mjhill.simulate.reference import plant_torque
 
-_DPI = 110
 _DIGITS = 4  # significant, of fitted values in a parameter file
 
 
@@ -118,88 +116,6 @@ def _write_text(path: Path, text: str) -> None:
         partial.write_text(text, encoding="utf-8")
 
 
-def estimate_rows(result: Identified) -> list[dict[str, Any]]:
-    """The parameters of an identified joint, one row each, in SI units."""
-    return [
-        {
-            "joint": result.joint.name,
-            "parameter": item.name,
-            "value": item.value,
-            "95 % from": item.low,
-            "to": item.high,
-            "bounds from": item.bounds[0],
-            "up to": item.bounds[1],
-            "from the data [%]": 100 * item.informed,
-            "at": "bound" if item.at_bound else "",
-        }
-        for item in result.estimates
-    ]
-
-
-def prediction_rows(predictions: Sequence[Prediction]) -> list[dict[str, Any]]:
-    """How well each measurement is predicted, one row each."""
-    rows = []
-    for item in predictions:
-        angle = item.quantity == "angle"
-        rows.append(
-            {
-                "measurement": item.measurement.source,
-                "samples": len(item.measurement),
-                "predicted": item.quantity,
-                "rms error": degrees(item.error) if angle else item.error,
-                "unit": "°" if angle else "N·m",
-                "variance explained [%]": 100 * item.explained,
-                "notes": list(item.measurement.notes),
-            }
-        )
-    return rows
-
-
-def fact_rows(facts: Sequence[Fact]) -> list[dict[str, Any]]:
-    """Facts that no fit used, as published and as measured in simulation, one row each."""
-    return [
-        {
-            "joint": fact.joint,
-            "quantity": fact.quantity,
-            "unit": fact.unit,
-            "low": fact.low,
-            "high": fact.high,
-            "ours": fact.measured,
-            "within": {True: "yes", False: "no", None: "not measured"}[fact.within],
-            "note": fact.note,
-            "source": fact.source,
-        }
-        for fact in facts
-    ]
-
-
-def brief(joint: Joint, held_out: Sequence[Fact]) -> dict[str, Any]:
-    """How well a joint agrees with the literature, in one row.
-
-    Args:
-        joint: The joint.
-        held_out: Facts that no fit used; those about other joints are ignored.
-    """
-    steps, published = step_rows(joint), published_rows(joint)
-    own = [fact for fact in held_out if fact.joint == joint.name]
-
-    def worst(key: str) -> float | None:
-        return max((abs(row[key]) for row in steps), default=None)
-
-    def inside(agreeing: Iterable[bool], count: int) -> str:
-        return f"{sum(agreeing)} of {count}" if count else ""
-
-    return {
-        "joint": joint.name,
-        "MAG off at most [%]": worst("off [%]"),
-        "T1 + T2 off at most [%]": worst("T1 + T2 off [%]"),
-        "passive torques and ranges inside": inside(
-            (row["outside by"] is None for row in published), len(published)
-        ),
-        "held-out facts inside": inside((fact.within is True for fact in own), len(own)),
-    }
-
-
 def markdown(report: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
     """The tables of a report as a page."""
     parts = [_PREFACE]
@@ -255,114 +171,6 @@ prior's variance that the data took away, by the width of the interval.""",
 }
 
 
-def plot_literature(joint: Joint, path: str | Path) -> None:
-    """Draw a joint's steps beside Table 2, and its passive torque beside published ones.
-
-    Raises:
-        ValueError: The path does not end in .png.
-        OSError: It cannot be written.
-    """
-    evidence = evidence_on(joint)
-    figure, panels = _figure(2 if evidence.steps else 1)
-    if evidence.steps:
-        _draw_steps(panels[0], evidence)
-    _draw_passive(panels[-1], evidence)
-    figure.suptitle(f"{joint.name}: identified, beside the literature")
-    _save(figure, path)
-
-
-def plot_predictions(joint: str, predictions: Sequence[Prediction], path: str | Path) -> None:
-    """Draw each measurement, the fitted joint's prediction of it, and the excitations.
-
-    Raises:
-        ValueError: The path does not end in .png.
-        OSError: It cannot be written.
-    """
-    figure, panels = _figure(len(predictions))
-    for axes, prediction in zip(panels, predictions, strict=True):
-        _draw_prediction(axes, prediction)
-    figure.suptitle(f"{joint}: measured and predicted")
-    _save(figure, path)
-
-
-def _figure(count: int) -> tuple[Any, list[Any]]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(max(5.2 * count, 8.0), 4.2), dpi=_DPI, layout="constrained")
-    return figure, list(figure.subplots(1, count, squeeze=False)[0])
-
-
-def _draw_steps(axes: Any, evidence: Evidence) -> None:
-    time = evidence.time
-    muscles = list(evidence.joint.muscles)
-    for (name, row), response in zip(
-        evidence.steps, evidence.responses([evidence.joint])[0], strict=True
-    ):
-        colour = MUSCLE_COLOURS[muscles.index(name) % 2]
-        axes.plot(time, np.degrees(response), color=colour, label=f"{name}, {row.level:g}")
-        wanted = degrees(row.magnitude) * step_response(time, *row.time_constants)
-        axes.plot(time, wanted, color=colour, linestyle="--", linewidth=1)
-    axes.plot([], [], color="grey", linestyle="--", linewidth=1, label="Table 2")
-    axes.set(title="Steps of input", xlabel="time [s]", ylabel="way from the start [°]")
-    axes.set_xlim(0, time[-1])
-    axes.set_ylim(bottom=0)
-    _finish(axes)
-
-
-def _draw_passive(axes: Any, evidence: Evidence) -> None:
-    joint = evidence.joint
-    low, high = joint.range
-    angle = np.linspace(low - 0.1, high + 0.1, 300)
-    torque = [plant_torque(joint, q) for q in angle.tolist()]
-    axes.plot(np.degrees(angle), torque, color="black", label="passive torque")
-    for index, item in enumerate(evidence.torques):
-        sign = -1 if item.angle > joint.rest_angle else 1
-        axes.plot(
-            [degrees(item.angle)] * 2, [sign * item.low, sign * item.high],
-            color="#2f8f4e", linewidth=5, alpha=0.6, solid_capstyle="butt",
-            label="published" if index == 0 else None,
-        )  # fmt: skip
-    for index, end in enumerate(joint.range):
-        label = "range of motion" if index == 0 else None
-        axes.axvline(degrees(end), color="grey", linestyle=":", label=label)
-    axes.set(title="Relaxed joint", xlabel=f"angle [°], {joint.positive} positive")
-    axes.set_ylabel("torque [N·m]")
-    axes.axhline(0, color="grey", linewidth=0.5)
-    _finish(axes)
-
-
-def _draw_prediction(axes: Any, prediction: Prediction) -> None:
-    time = prediction.measurement.time
-    scale, unit = (180 / np.pi, "°") if prediction.quantity == "angle" else (1.0, "N·m")
-    axes.plot(time, scale * prediction.measured, color="grey", linewidth=3, label="measured")
-    axes.plot(time, scale * prediction.predicted, color="black", label="predicted")
-    name = Path(prediction.measurement.source).name
-    axes.set(title=name, xlabel="time [s]", ylabel=f"{prediction.quantity} [{unit}]")
-    axes.set_xlim(time[0], time[-1])
-    inputs = axes.twinx()
-    for index, (muscle, values) in enumerate(prediction.measurement.excitation.items()):
-        colour = MUSCLE_COLOURS[index % 2]
-        inputs.fill_between(time, values, step="post", color=colour, alpha=0.25, linewidth=0)
-        axes.fill_between([], [], color=colour, alpha=0.25, label=muscle)
-    inputs.set(ylim=(0, 4), yticks=[0, 1], ylabel="input [-]")
-    inputs.yaxis.set_label_coords(1.06, 0.125)
-    _finish(axes)
-
-
-def _finish(axes: Any) -> None:
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize="small", frameon=True, framealpha=0.8)
-
-
-def _save(figure: Any, path: str | Path) -> None:
-    path = Path(path)
-    if path.suffix != ".png":
-        raise ValueError(f"plot {str(path)!r} must end in .png")
-    take_literally(figure)
-    with replacing(path) as partial:
-        figure.savefig(partial)
-
-
 def parameter_text(results: Iterable[Identified], parameters: str | Path | None = None) -> str:
     """The text of a parameter file with the values of some joints replaced by fitted ones.
 
@@ -378,15 +186,26 @@ def parameter_text(results: Iterable[Identified], parameters: str | Path | None 
     results = list(results)
     document = tomlkit.parse(Path(parameters or parameter_file()).read_text(encoding="utf-8"))
     for result in results:
+        table = document[result.joint.name]
         for free, estimate in zip(result.free, result.estimates, strict=True):
-            entry = document[result.joint.name]
-            for key in free.path:
-                entry = entry[key]  # type: ignore[index]
-            entry["value"] = rounded(estimate.value, free.low, free.high)  # type: ignore[index]
-            if result.predictions:
-                before = str(entry["source"])  # type: ignore[index]
-                entry["source"] = source_text(result, estimate, before)  # type: ignore[index]
+            value = rounded(estimate.value, free.low, free.high)
+            for path, here in free.values(value).items():
+                entry = _entry(table, path)
+                entry["value"] = here
+                if result.predictions:
+                    entry["source"] = source_text(result, estimate, str(entry["source"]))
+        for free, value in result.pinned:
+            for path, here in free.values(value).items():
+                entry = _entry(table, path)
+                entry["value"] = here
+                entry["source"] = pinned_text(str(entry["source"]), entry.pop("bounds"))
     return header(results, parameters) + tomlkit.dumps(document)
+
+
+def _entry(table: Any, path: Iterable[str]) -> Any:
+    for key in path:
+        table = table[key]
+    return table
 
 
 def write_parameters(

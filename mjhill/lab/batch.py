@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import mujoco
 import mujoco.batch
@@ -81,12 +82,23 @@ class Rigs:
         """
         inputs = np.empty((len(self.joints), steps, self._muscles + 1))
         inputs[:, :, : self._muscles], inputs[:, :, self._muscles] = excitation, torque
-        with installed():
+        with installed(), quiet():
             self._batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_NONE))
             _start(self._batch, self.joints, start, velocity, before)
             found = self._batch.rollout(steps, inputs, CONTROL_AND_TORQUE, record=record)
         check_batch(self._batch, self.joints[0])
         return {str(name): np.asarray(values) for name, values in found.items()}
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Do not print the warnings of MuJoCo; the data count them."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def joint_angles(
@@ -184,9 +196,7 @@ def _batch(
     return batch
 
 
-def _simulations(
-    joints: Sequence[Joint], timestep: float, threads: int = 0
-) -> mujoco.batch.Batch:
+def _simulations(joints: Sequence[Joint], timestep: float, threads: int = 0) -> mujoco.batch.Batch:
     spec = joint_spec(joints[0])
     spec.option.timestep = timestep
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT  # the model has none

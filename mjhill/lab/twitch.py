@@ -82,13 +82,9 @@ def twitches(
         raise UnmeasuredError(f"the torque of {muscle} does not rise after the impulse")
     time = np.arange(torque.shape[1]) * timestep
     at = np.array([_time_of_peak(row, timestep) for row in torque])
-    half = np.array(
-        [_time_of_half(time, row, peak) for row, peak in zip(torque, top, strict=True)]
-    )
+    half = np.array([_time_of_half(time, row, peak) for row, peak in zip(torque, top, strict=True)])
     if np.isnan(half).any():
-        raise UnmeasuredError(
-            f"{muscle} has not half relaxed {_TWITCH_TIME:g} s after the impulse"
-        )
+        raise UnmeasuredError(f"{muscle} has not half relaxed {_TWITCH_TIME:g} s after the impulse")
     return Twitches(at - 0.5 * width, half - at, top / tetanus.max(axis=1), time, torque)
 
 

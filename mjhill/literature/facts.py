@@ -31,7 +31,16 @@ MEASURES = (  # that an entry can name
     "stiffness_slope",
 )
 PER_SI = MappingProxyType(
-    {"°": 180 / pi, "°/s": 180 / pi, "ms": 1e3, "%": 1e2, "rad/s": 1, "N·m/rad": 1, "1/rad": 1, "-": 1}
+    {
+        "°": 180 / pi,
+        "°/s": 180 / pi,
+        "ms": 1e3,
+        "%": 1e2,
+        "rad/s": 1,
+        "N·m/rad": 1,
+        "1/rad": 1,
+        "-": 1,
+    }
 )
 
 

@@ -82,9 +82,17 @@ class EndAngle:
         return _balance(joint, self.muscle)
 
     def deviation(self, joint: Joint) -> float:
-        """Standard deviations between a joint and the literature."""
+        """Standard deviations between a joint and the literature.
+
+        Of half a turn from rest where nothing stops the joint.
+        """
         middle = 0.5 * (self.low + self.high)
-        return (self.measured(joint) - middle) * _SPREAD / (self.high - self.low)
+        try:
+            angle = self.measured(joint)
+        except ValueError:
+            sign = 1.0 if joint.gears[self.muscle] < 0 else -1.0
+            angle = joint.rest_angle + sign * pi
+        return (angle - middle) * _SPREAD / (self.high - self.low)
 
 
 def passive_torques(joint: str) -> list[PassiveTorque]:

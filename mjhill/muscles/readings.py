@@ -43,9 +43,7 @@ def series_stiffness(muscle: Hill, stretch: float) -> float:
 def stretch_at(muscle: Hill, force: float) -> float:
     """Stretch of the series element [rad or m] that carries a force [N·m or N]."""
     share = force / muscle.max_isometric_force
-    return series_stretch_at(
-        share, muscle.series_stretch, muscle.series_shape, muscle.series_limit
-    )
+    return series_stretch_at(share, muscle.series_stretch, muscle.series_shape, muscle.series_limit)
 
 
 def _series(muscle: Hill, stretch: float) -> tuple[float, float]:

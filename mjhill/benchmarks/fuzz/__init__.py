@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
 from dataclasses import asdict
 from typing import Any
 
@@ -17,6 +16,7 @@ from mjhill.benchmarks.fuzz.models import KINDS
 from mjhill.benchmarks.fuzz.outcomes import STEPS, STRONGEST, Outcome, run
 from mjhill.benchmarks.result import Result
 from mjhill.engine.install import installed
+from mjhill.lab.batch import quiet
 
 COUNT = 100_000  # models in all
 SHOWN = 20  # silent failures to list
@@ -103,17 +103,6 @@ def replay(case: str) -> Outcome:
 def _outcomes(jobs: list[tuple[str, int]]) -> list[Outcome]:
     with installed(), quiet():
         return [run(*job) for job in jobs]
-
-
-@contextmanager
-def quiet() -> Iterator[None]:
-    """Do not print the warnings of MuJoCo; the data count them."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda text: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 def table(outcomes: Sequence[Outcome]) -> Result:

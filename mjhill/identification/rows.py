@@ -1,0 +1,177 @@
+"""How far fitted joints are from the literature and from measurements, as rows of tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from math import degrees
+from typing import Any
+
+from mjhill.identification.evidence import Evidence, evidence_on
+from mjhill.identification.facts import Fact
+from mjhill.identification.fit import Identified
+from mjhill.identification.movement import Prediction
+from mjhill.joints.joint import Joint
+
+_NEAR = 1.3  # ratio of T1 to T2 below which only their sum is well determined
+
+
+def step_rows(joint: Joint, start: str = "relaxed") -> list[dict[str, Any]]:
+    """Table 2 beside the joint's own steps, one row for each step; degrees and ms.
+
+    Args:
+        joint: The joint.
+        start: How it starts a step, one of ``STARTS``.
+    """
+    evidence = evidence_on(joint, start=start)
+    rows = []
+    for (muscle, row), fit in zip(evidence.steps, evidence.fits(joint), strict=True):
+        wanted = [1e3 * constant for constant in row.time_constants]
+        found = [1e3 * constant for constant in fit.time_constants]
+        rows.append(
+            {
+                "movement": row.movement,
+                "muscle": muscle,
+                "excitation": row.level,
+                "start [°]": degrees(joint.postures[muscle]),
+                "recoil [%]": 100 * abs(joint.postures[muscle] - joint.rest_angle) / row.magnitude,
+                "MAG [°]": degrees(row.magnitude),
+                "ours [°]": degrees(fit.magnitude),
+                "off [%]": 100 * (fit.magnitude / row.magnitude - 1),
+                "T1 [ms]": wanted[0],
+                "T2 [ms]": wanted[1],
+                "our T1 [ms]": found[0],
+                "our T2 [ms]": found[1],
+                "T1 + T2 off [%]": 100 * (sum(found) / sum(wanted) - 1),
+                "fit leaves [%]": 100 * fit.misfit,
+                "split": "ill-conditioned" if min(map(_ratio, (wanted, found))) < _NEAR else "",
+                "note": row.note,
+            }
+        )
+    return rows
+
+
+def _ratio(constants: list[float]) -> float:
+    return constants[0] / max(constants[1], 1e-9)
+
+
+def published_rows(joint: Joint) -> list[dict[str, Any]]:
+    """Published passive torques and ranges of motion beside a joint's own, one row each."""
+    return list(_published_rows(evidence_on(joint)))
+
+
+def _published_rows(evidence: Evidence) -> Iterator[dict[str, Any]]:
+    joint = evidence.joint
+    for torque in evidence.torques:
+        yield _published_row(
+            joint,
+            f"passive torque at {degrees(torque.angle):.0f}° [N·m]",
+            (torque.low, torque.high),
+            torque.measured(joint),
+            torque.source,
+        )
+    for end in evidence.ends:
+        yield _published_row(
+            joint,
+            f"full effort of {end.muscle} ends at [°]",
+            (degrees(end.low), degrees(end.high)),
+            degrees(end.measured(joint)),
+            end.source,
+        )
+
+
+def _published_row(
+    joint: Joint, quantity: str, span: tuple[float, float], ours: float, source: str
+) -> dict[str, Any]:
+    low, high = span
+    outside = max(low - ours, ours - high, 0.0)
+    return {
+        "joint": joint.name,
+        "quantity": quantity,
+        "low": low,
+        "high": high,
+        "ours": ours,
+        "outside by": outside or None,
+        "source": source,
+    }
+
+
+def estimate_rows(result: Identified) -> list[dict[str, Any]]:
+    """The parameters of an identified joint, one row each, in SI units."""
+    return [
+        {
+            "joint": result.joint.name,
+            "parameter": item.name,
+            "value": item.value,
+            "95 % from": item.low,
+            "to": item.high,
+            "bounds from": item.bounds[0],
+            "up to": item.bounds[1],
+            "from the data [%]": 100 * item.informed,
+            "at": "bound" if item.at_bound else "",
+        }
+        for item in result.estimates
+    ]
+
+
+def prediction_rows(predictions: Sequence[Prediction]) -> list[dict[str, Any]]:
+    """How well each measurement is predicted, one row each."""
+    rows = []
+    for item in predictions:
+        angle = item.quantity == "angle"
+        rows.append(
+            {
+                "measurement": item.measurement.source,
+                "samples": len(item.measurement),
+                "predicted": item.quantity,
+                "rms error": degrees(item.error) if angle else item.error,
+                "unit": "°" if angle else "N·m",
+                "variance explained [%]": 100 * item.explained,
+                "notes": list(item.measurement.notes),
+            }
+        )
+    return rows
+
+
+def fact_rows(facts: Sequence[Fact]) -> list[dict[str, Any]]:
+    """Facts that no fit used, as published and as measured in simulation, one row each."""
+    return [
+        {
+            "joint": fact.joint,
+            "quantity": fact.quantity,
+            "unit": fact.unit,
+            "low": fact.low,
+            "high": fact.high,
+            "ours": fact.measured,
+            "within": {True: "yes", False: "no", None: "not measured"}[fact.within],
+            "note": fact.note,
+            "source": fact.source,
+        }
+        for fact in facts
+    ]
+
+
+def brief(joint: Joint, held_out: Sequence[Fact]) -> dict[str, Any]:
+    """How well a joint agrees with the literature, in one row.
+
+    Args:
+        joint: The joint.
+        held_out: Facts that no fit used; those about other joints are ignored.
+    """
+    steps, published = step_rows(joint), published_rows(joint)
+    own = [fact for fact in held_out if fact.joint == joint.name]
+
+    def worst(key: str) -> float | None:
+        return max((abs(row[key]) for row in steps), default=None)
+
+    def inside(agreeing: Iterable[bool], count: int) -> str:
+        return f"{sum(agreeing)} of {count}" if count else ""
+
+    return {
+        "joint": joint.name,
+        "MAG off at most [%]": worst("off [%]"),
+        "T1 + T2 off at most [%]": worst("T1 + T2 off [%]"),
+        "passive torques and ranges inside": inside(
+            (row["outside by"] is None for row in published), len(published)
+        ),
+        "held-out facts inside": inside((fact.within is True for fact in own), len(own)),
+    }
