@@ -19,6 +19,8 @@ from mjhill.muscles import steady_states
 CONTROL_AND_TORQUE = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 """What a rollout reads for each step: the excitation of every muscle, then the joint's torque."""
 
+_CLAMP = 1e15  # [kg·m²]; torques of a joint are lost in the rounding of what drives it
+
 _Values = NDArray[np.float64]
 
 
@@ -72,8 +74,9 @@ def driving_torques(
 ) -> _Values:
     """External torque [N·m] that moves each joint along a path, shape (N, T).
 
-    The path is prescribed, as by a rigid clamp. The torque balances the joint's inertia, passive
-    torque and muscles.
+    The path is prescribed, as by a rigid clamp: an armature so heavy that only the torque on it
+    moves the joint, at the path's velocities. What is returned is the torque that balances the
+    joint's own inertia, passive torque and muscles.
 
     Args:
         joints: N joints, as in ``joint_angles``.
@@ -89,19 +92,16 @@ def driving_torques(
     speed = np.diff(path, prepend=path[0]) / timestep
     acceleration = np.gradient(np.gradient(path, timestep), timestep)
     inertial = np.outer([joint.inertia for joint in joints], acceleration)
-    result = np.empty((len(joints), len(path)))
-    inputs = np.asarray(excitation)
+    drive = _CLAMP * np.diff(speed, append=speed[-1]) / timestep
+    inputs = np.column_stack([excitation, drive])
     with installed():
-        # one thread: a single step takes less time than waking other threads
-        batch = _batch(joints, path[0], 0.0, before, timestep, threads=1)
-        qpos, qvel, ctrl = batch.qpos, batch.qvel, batch.ctrl
-        passive, muscles = batch.bind("qfrc_passive"), batch.bind("qfrc_actuator")
-        for step in range(len(path)):
-            qpos[:, 0], qvel[:, 0], ctrl[:] = path[step], speed[step], inputs[step]
-            batch.step()
-            result[:, step] = inertial[:, step] - passive[:, 0] - muscles[:, 0]
+        batch = _batch(joints, path[0], 0.0, before, timestep, armature=_CLAMP)
+        forces = batch.rollout(
+            len(path), inputs, CONTROL_AND_TORQUE, record=("qfrc_passive", "qfrc_actuator")
+        )
     check_batch(batch, joints[0])
-    return result
+    passive, muscles = (forces[name][:, :, 0] for name in ("qfrc_passive", "qfrc_actuator"))
+    return np.asarray(inertial - passive - muscles)
 
 
 def _batch(
@@ -110,15 +110,16 @@ def _batch(
     velocity: ArrayLike,
     before: ArrayLike,
     timestep: float,
-    threads: int = 0,
+    armature: float = 0.0,
 ) -> mujoco.batch.Batch:
-    """One simulation for each joint, muscles steady at the start; 0 threads means one a core."""
+    """One simulation for each joint, muscles steady at the start, on all cores."""
     spec = joint_spec(joints[0])
     spec.option.timestep = timestep
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT  # the model has none
+    spec.joints[0].armature = armature
     with without_python_callbacks():
         model = spec.compile()
-    batch = mujoco.batch.Batch(model, nsim=len(joints), nthread=threads)
+    batch = mujoco.batch.Batch(model, nsim=len(joints))
     _expand(batch, joints)
     batch.qpos[:, 0], batch.qvel[:, 0] = start, velocity
     excitations = np.broadcast_to(before, (len(joints), len(joints[0].muscles)))
