@@ -59,6 +59,7 @@ def measured(recording, pick=slice(None)):
         {name: recording[f"{name}.u"][pick] for name in ("elbow_flexor", "elbow_extensor")},
         recording["elbow.angle"][pick],
         recording["elbow.applied"][pick],
+        simulated=float(recording.about["timestep"]),
     )
 
 

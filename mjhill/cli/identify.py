@@ -26,6 +26,19 @@ _HIDDEN = ("note", "source", "muscle")  # from tables on the screen; the JSON fi
 )  # fmt: skip
 @click.option("--fit", "only", multiple=True, metavar="NAME", help="Fit only this parameter.")
 @click.option(
+    "--hold", "inputs", flag_value="hold", default=None,
+    help="Inputs hold each value until the next sample, as digital stimulators do. By default "
+    "each input is taken as it looks: held if it has plateaus and jumps.",
+)  # fmt: skip
+@click.option(
+    "--join", "inputs", flag_value="join",
+    help="Inputs go in straight lines from sample to sample, as EMG envelopes nearly do.",
+)  # fmt: skip
+@click.option(
+    "--delay", is_flag=True,
+    help="Fit a delay too, 0 to 100 ms, by which the excitations act later than measured.",
+)  # fmt: skip
+@click.option(
     "--parameters", type=click.Path(path_type=Path),
     help="Parameter file with bounds; by default the one that comes with mjhill.",
 )  # fmt: skip
@@ -39,6 +52,8 @@ def identify(
     data: tuple[Path, ...],
     predict: tuple[str, ...],
     only: tuple[str, ...],
+    inputs: str | None,
+    delay: bool,
     parameters: Path | None,
     output: Path,
     as_json: bool,
@@ -57,9 +72,12 @@ def identify(
         raise ValueError(f"name the one joint that was measured, got {len(joints)}")
     if not data and (predict or only):
         raise ValueError("--predict and --fit go with --data; the literature is fitted whole")
+    if not data and (inputs or delay):
+        raise ValueError("--hold, --join and --delay go with --data; they are about its inputs")
     names = _known(joints, parameters)
     files = _files(names, output, measured=bool(data))
-    results = _fitted(names, data, predict, only, parameters)
+    options = {"predict": predict or None, "only": only, "inputs": inputs, "delay": delay}
+    results = _fitted(names, data, parameters, options)
     what = "writing" if data else "measuring what the fit did not use"
     with progress_bar(what) as progress:
         report = write(results, output, parameters=parameters, progress=progress)
@@ -94,9 +112,8 @@ def _files(names: list[str], output: Path, *, measured: bool) -> dict[str, Path]
 def _fitted(
     names: list[str],
     data: tuple[Path, ...],
-    predict: tuple[str, ...],
-    only: tuple[str, ...],
     parameters: Path | None,
+    options: dict[str, Any],
 ) -> list[Any]:
     from mjhill import identification
     from mjhill.identification.literature_fit import check_evidence
@@ -109,12 +126,7 @@ def _fitted(
         with progress_bar(f"fitting {name}{of}") as progress:
             results.append(
                 identification.identify(
-                    name,
-                    data,
-                    predict=predict or None,
-                    only=only,
-                    parameters=parameters,
-                    progress=progress,
+                    name, data, parameters=parameters, progress=progress, **options
                 )
             )
     return results

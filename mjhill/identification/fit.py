@@ -410,17 +410,24 @@ class Identified:
         estimates: Their values and confidence, in the same order.
         predictions: What the fitted joint does in each measurement, see ``Prediction``; none for
             a fit to the literature.
+        delay: By how much the excitations act later than measured [s], if that was fitted.
     """
 
     joint: Joint
     free: tuple[Free, ...]
     estimates: tuple[Estimate, ...]
     predictions: tuple[Any, ...] = ()
+    delay: Estimate | None = None
+
+    @property
+    def all_estimates(self) -> tuple[Estimate, ...]:
+        """The estimates, with that of the delay."""
+        return self.estimates if self.delay is None else (*self.estimates, self.delay)
 
     def __str__(self) -> str:
         """A line for each parameter: value, interval of 95 % confidence, share from the data."""
         lines = [f"{self.joint.name}, fitted: value, 95 % interval, share from the data"]
-        for one in self.estimates:
+        for one in self.all_estimates:
             lines.append(
                 f"{one.name}: {one.value:.4g}, {one.low:.3g} to {one.high:.3g}, {one.informed:.0%}"
             )

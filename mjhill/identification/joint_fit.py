@@ -19,6 +19,8 @@ def identify(
     *,
     predict: str | Sequence[str] | None = None,
     only: Sequence[str] = (),
+    inputs: str | None = None,
+    delay: bool = False,
     parameters: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Identified:
@@ -34,6 +36,9 @@ def identify(
         predict: ``angle`` or ``torque``, once for all measurements or once for each; by default
             torque where the joint is held still, angle elsewhere.
         only: Names of the parameters to fit; by default all that have bounds.
+        inputs: ``hold``: each value of an excitation or of the torque lasts until the next
+            sample; ``join``: straight lines go from sample to sample. By default as each looks.
+        delay: Whether to fit a delay of the excitations too, 0 to 0.1 s.
         parameters: Parameter file with bounds; by default the one that comes with mjhill.
         progress: Called with the share done, 0 to 1.
 
@@ -50,14 +55,21 @@ def identify(
     if joint not in known:
         raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(known)}")
     if not measurements:
-        if predict or only:
-            raise ValueError("predict and only need measurements; give them")
+        if predict or only or inputs or delay:
+            raise ValueError("predict, only, inputs and delay need measurements; give them")
         return from_literature(joint, parameters, progress)
     read = [
         one if isinstance(one, Measurement) else read_measurement(Path(one), known[joint])
         for one in measurements
     ]
     result, predictions = from_measurements(
-        joint, read, predict=predict, only=only, parameters=parameters, progress=progress
+        joint,
+        read,
+        predict=predict,
+        only=only,
+        inputs=inputs,
+        delay=delay,
+        parameters=parameters,
+        progress=progress,
     )
     return replace(result, predictions=tuple(predictions))

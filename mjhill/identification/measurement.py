@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.identification.columns import Column, Columns, read_columns, read_table
+from mjhill.identification.inputs import simulated_step
 from mjhill.joints.joint import Joint
 
 _LEAST_SAMPLES = 50
@@ -33,6 +34,8 @@ class Measurement:
         angle: Angle of the joint [rad], shape (T,).
         torque: External torque on the joint, gravity included [N·m], shape (T,), positive towards
             positive angles.
+        simulated: Timestep [s] of the simulation that this is a recording of, None of anything
+            else: its inputs were held over each step, and a fit takes the same steps.
     """
 
     source: str
@@ -40,6 +43,7 @@ class Measurement:
     excitation: Mapping[str, NDArray[np.float64]]
     angle: NDArray[np.float64]
     torque: NDArray[np.float64]
+    simulated: float | None = None
 
     def __post_init__(self) -> None:
         """Check shapes.
@@ -98,6 +102,7 @@ def read_measurement(path: str | Path, joint: Joint) -> Measurement:
         },
         angle=columns.angle.values,
         torque=columns.torque.values,
+        simulated=simulated_step(path),
     )
 
 

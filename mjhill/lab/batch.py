@@ -82,7 +82,7 @@ def driving_torques(
         joints: N joints, as in ``joint_angles``.
         path: Angle at every step [rad], shape (T,).
         before: As in ``joint_angles``.
-        excitation: Excitation of each muscle over each step [-], shape (T, muscles).
+        excitation: Excitation of each muscle over each step [-], broadcast to (N, T, muscles).
         timestep: Length of a step [s].
 
     Raises:
@@ -92,16 +92,18 @@ def driving_torques(
     speed = np.diff(path, prepend=path[0]) / timestep
     acceleration = np.gradient(np.gradient(path, timestep), timestep)
     inertial = np.outer([joint.inertia for joint in joints], acceleration)
-    drive = _CLAMP * np.diff(speed, append=speed[-1]) / timestep
-    inputs = np.column_stack([excitation, drive])
+    muscles = len(joints[0].muscles)
+    inputs = np.empty((len(joints), len(path), muscles + 1))
+    inputs[:, :, :muscles] = excitation
+    inputs[:, :, muscles] = _CLAMP * np.diff(speed, append=speed[-1]) / timestep
     with installed():
         batch = _batch(joints, path[0], 0.0, before, timestep, armature=_CLAMP)
         forces = batch.rollout(
             len(path), inputs, CONTROL_AND_TORQUE, record=("qfrc_passive", "qfrc_actuator")
         )
     check_batch(batch, joints[0])
-    passive, muscles = (forces[name][:, :, 0] for name in ("qfrc_passive", "qfrc_actuator"))
-    return np.asarray(inertial - passive - muscles)
+    passive, active = (forces[name][:, :, 0] for name in ("qfrc_passive", "qfrc_actuator"))
+    return np.asarray(inertial - passive - active)
 
 
 def _batch(
