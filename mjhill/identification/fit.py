@@ -227,6 +227,7 @@ def solve(
     count: int,
     progress: Callable[[float], None] | None = None,
     start: NDArray[np.float64] | None = None,
+    difference: float = _DIFFERENCE,
 ) -> Solution:
     """Fit ``count`` free parameters.
 
@@ -235,6 +236,7 @@ def solve(
         count: P, the number of free parameters.
         progress: Called with the share done, 0 to 1, guessed from the steps so far.
         start: Deviations to start from, shape (P,); by default the middles of the bounds.
+        difference: Change of a parameter for slopes of the residuals, in standard deviations.
 
     Raises:
         RuntimeError: The fit did not settle.
@@ -250,7 +252,7 @@ def solve(
         np.zeros(count) if start is None else start,
         all_residuals,
         bounds,
-        eps=_DIFFERENCE,
+        eps=difference,
         max_iter=_ITERATIONS,
         verbose=mujoco.minimize.Verbosity.SILENT,
         iter_callback=report,
@@ -260,10 +262,39 @@ def solve(
     point = point.reshape(count, 1)
     found = all_residuals(point)
     jacobian, _ = mujoco.minimize.jacobian_fd(
-        all_residuals, point, found, np.float64(_DIFFERENCE), 0, [b.reshape(-1, 1) for b in bounds]
+        all_residuals, point, found, np.float64(difference), 0, [b.reshape(-1, 1) for b in bounds]
     )
     covariance = np.linalg.inv(jacobian.T @ jacobian)
     return Solution(point[:, 0], covariance, jacobian, 0.5 * float((found**2).sum()))
+
+
+_WIDE = 0.02  # standard deviations of a prior, over which a slope is first taken
+_NARROW = 1e-4  # of these, the least
+
+
+def over_uncertainty(residuals: Residuals, solution: Solution) -> Solution:
+    """A solution with slopes taken over the range in which it is uncertain.
+
+    Residuals of a simulation have kinks and small jumps, where its steps are divided otherwise.
+    A slope over a much shorter range than the uncertainty shows these, and not the data.
+
+    Args:
+        residuals: What was solved.
+        solution: Its solution.
+    """
+    evaluate = with_priors(residuals)
+    point = solution.deviations
+    reach = np.full(point.size, _WIDE)
+    for _ in range(2):
+        low = np.maximum(point - reach, -DEVIATIONS)
+        high = np.minimum(point + reach, DEVIATIONS)
+        found = evaluate(
+            np.concatenate([np.diag(end - point) for end in (low, high)], axis=1) + point[:, None]
+        )
+        jacobian = (found[:, point.size :] - found[:, : point.size]) / (high - low)
+        covariance = np.linalg.inv(jacobian.T @ jacobian)
+        reach = np.maximum(np.sqrt(np.diag(covariance)), _NARROW)
+    return replace(solution, covariance=covariance, jacobian=jacobian)
 
 
 _RISE = 0.5 * CONFIDENT**2  # of the cost, at the end of an interval

@@ -16,10 +16,12 @@ from mjhill.identification.fit import (
     free_parameters,
     intervals,
     joint_at,
+    over_uncertainty,
     solve,
 )
 from mjhill.identification.inputs import WAYS
 from mjhill.identification.measurement import Measurement
+from mjhill.identification.noise import Noise, noise_of, white
 from mjhill.identification.trial import Trial, make_trial
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import read_joints
@@ -28,7 +30,8 @@ QUANTITIES = ("angle", "torque")  # what can be predicted
 DELAY = Free(("delay",), 0.0, 0.1)  # [s], bounds of that of a measured output
 _FIRST_NOISE = 0.02  # of the spread of what is predicted, until the fit says better
 _ROUNDS = 4
-_SAME = 0.02  # of a weight, by which it may still change
+_DIFFERENCE = 1e-3  # standard deviations; shorter ones find the kinks of a simulation
+_SAME = 0.02  # of the noise, by which it may still change
 _OFF = 0.1  # standard deviations of all data together, by which a correction may still change
 
 _Values = NDArray[np.float64]
@@ -220,11 +223,17 @@ class _Problem:
             for trial, offsets, delays in self._settings(points)
         ]
 
-    def corrections(self, point: _Values) -> list[_Values]:
-        """What the steps of the simulation miss of each trial at a point, shape (T,)."""
+    def known(self, point: _Values) -> list[tuple[_Values, _Values]]:
+        """At a point, for each trial: its correction and the errors of its input.
+
+        See ``Trial.correction`` and ``Trial.input_errors``.
+        """
         joint = self.joints(point[:, None])[0]
         return [
-            trial.correction(joint, offsets, delays)
+            (
+                trial.correction(joint, offsets, delays),
+                trial.input_errors(joint, offsets, delays),
+            )
             for trial, offsets, delays in self._settings(point[:, None])
         ]
 
@@ -238,14 +247,14 @@ def _solve(
         The solution, the ends of the intervals of confidence, and what the solution predicts.
     """
     trials, count = problem.trials, problem.count
-    weights = [1.0 / (_FIRST_NOISE * trial.spread) for trial in trials]
+    noises = [white(1.0 / (_FIRST_NOISE * trial.spread), len(trial.time)) for trial in trials]
     missed = [np.zeros(len(trial.time)) for trial in trials]
 
     def residuals(points: _Values) -> _Values:
         parts = [
-            weight * (predicted + more - trial.measured)
-            for trial, weight, more, predicted in zip(
-                trials, weights, missed, problem.predictions(points), strict=True
+            noise.whiten(predicted + more - trial.measured)
+            for trial, noise, more, predicted in zip(
+                trials, noises, missed, problem.predictions(points), strict=True
             )
         ]
         return np.ascontiguousarray(np.concatenate(parts, axis=1).T)
@@ -254,23 +263,27 @@ def _solve(
     for stage in range(_ROUNDS):
         done = stage / _ROUNDS
         report = (lambda share, d=done: progress(d + share / _ROUNDS)) if progress else None
-        solution = solve(residuals, count, report, start=point)
+        solution = solve(residuals, count, report, start=point, difference=_DIFFERENCE)
         point = solution.deviations
-        more = problem.corrections(point)
+        known = problem.known(point)
         predicted = [
-            values[0] + extra
-            for values, extra in zip(problem.predictions(point[:, None]), more, strict=True)
+            values[0] + more
+            for values, (more, _) in zip(problem.predictions(point[:, None]), known, strict=True)
         ]
         found = [
-            trial.weight(values, count / len(trials))
-            for trial, values in zip(trials, predicted, strict=True)
+            noise_of(values - trial.measured, errors, count / len(trials), trial.spread)
+            for trial, values, (_, errors) in zip(trials, predicted, known, strict=True)
         ]
-        # the prediction of the fit is still off by this many of the data's errors
-        off = [
-            w * float(np.linalg.norm(a - b)) for w, a, b in zip(found, more, missed, strict=True)
-        ]
-        same = np.allclose(found, weights, rtol=_SAME) and max(off) < _OFF
+        same = all(
+            _alike(new, old) and new.scale * np.linalg.norm(more - before) < _OFF
+            for new, old, (more, _), before in zip(found, noises, known, missed, strict=True)
+        )
         if same or stage == _ROUNDS - 1:
             break
-        weights, missed = found, more
+        noises, missed = found, [more for more, _ in known]
+    solution = over_uncertainty(residuals, solution)
     return solution, intervals(residuals, solution, problem.wanted), predicted
+
+
+def _alike(new: Noise, old: Noise) -> bool:
+    return new.basis.shape == old.basis.shape and abs(new.scale / old.scale - 1) < _SAME

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.identification.inputs import is_held, step_means
 from mjhill.identification.measurement import Measurement
+from mjhill.identification.noise import white_noise
 from mjhill.joints.joint import Joint
 from mjhill.lab.batch import driving_torques, joint_angles
 
@@ -19,10 +20,10 @@ _SMOOTHING = 10.0  # [Hz], cut-off of the path of a driven joint, usual for huma
 _LONGEST_STEP = 1e-3  # [s]
 _REFINEMENT = 8  # steps of the finer run to one
 _EVEN = 1e-3  # of an interval, by which samples may be off and still count as even
-_LEAST_NOISE = 1e-4  # of the spread of what is predicted: no simulation is nearer to a joint
+_FASTEST_MODE = 20.0  # [Hz], of the noise of a torque; above, inertia lets little through
+_MOST_MODES = 200
 _START_SPAN = 0.05  # [s] from whose samples the start is guessed
 _LEAST_SPREAD = 1e-6  # [rad] and [rad/s]
-_WINDOW = 5.0  # correlation times over which the autocorrelation of residuals is summed
 
 _Values = NDArray[np.float64]
 
@@ -38,7 +39,7 @@ class Trial:
         grid: Times of the steps [s], shape (S,).
         held: By input, each muscle and ``torque``: whether a value lasts until the next sample,
             or straight lines join them.
-        torque: External torque over each step [N·m], shape (S,).
+        torque: External torque over each step [N·m], shape (S,), or (K, S) for K joints.
         path: Angle at each step [rad] where the torque is predicted, shape (S,); else None.
         start: Angle [rad] and velocity [rad/s] at time 0, shape (2,).
         start_spread: Their standard deviations, shape (2,).
@@ -109,7 +110,7 @@ class Trial:
                 velocity=velocity,
                 before=before,
                 excitation=excitation[:, :-1],
-                torque=self.torque[:-1],
+                torque=self.torque[..., :-1],
                 steps=len(self.grid) - 1,
                 timestep=timestep,
             )
@@ -140,37 +141,37 @@ class Trial:
         coarse, fine = (trial.predict([joint], offsets, delays)[0] for trial in (self, self.finer))
         return np.asarray((fine - coarse) * (_REFINEMENT / (_REFINEMENT - 1)))
 
-    def weight(self, predicted: _Values, parameters: float) -> float:
-        """Weight of a residual, from what a prediction leaves.
+    def input_errors(
+        self, joint: Joint, offsets: _Values, delays: _Values | None = None
+    ) -> _Values:
+        """What noise of the measured torque does to a prediction, shape (T, K).
 
-        Residuals that hang together count as fewer: as many as there are correlation times in
-        them.
+        The noise is white over the samples, of the size that they show. It is taken apart into
+        cosines, each of its own random size. Slow ones come first; fast ones move no joint.
 
         Args:
-            predicted: The prediction, shape (T,).
-            parameters: Number of parameters that were fitted to it.
+            joint: The joint.
+            offsets: Deviations of its start, shape (2, 1).
+            delays: By how much its excitations come late [s], shape (1,).
+
+        Returns:
+            For each cosine, of a size of one standard deviation, what it adds. None (K = 0) where
+            the torque is predicted, or has no noise.
         """
-        left = predicted - self.measured
-        count = max(left.size - parameters, 0.5 * left.size)
-        noise = max(float(np.sqrt(left @ left / count)), _LEAST_NOISE * self.spread)
-        return 1.0 / (noise * float(np.sqrt(correlation_time(left))))
-
-
-def correlation_time(left: _Values) -> float:
-    """Number of residuals that are worth one, at least 1, from their autocorrelation.
-
-    1 + 2 (r1 + r2 + ...), r the correlation from sample to sample, to the next but one, and so on,
-    summed over a window of five times the result (Sokal 1997, sect. 3). Unlike the correlation of
-    neighbours alone, it does not depend on how finely a smooth disturbance was sampled.
-    """
-    power = np.abs(np.fft.rfft(left, 2 * left.size)) ** 2
-    covariance = np.fft.irfft(power)[: left.size]
-    if not covariance[0] > 0:
-        return 1.0
-    times = 2.0 * np.cumsum(covariance / covariance[0]) - 1.0
-    inside = np.arange(left.size) < _WINDOW * times
-    window = left.size - 1 if inside.all() else int(np.argmin(inside))
-    return max(float(times[window]), 1.0)
+        size = white_noise(self.measurement.torque)
+        count = len(self.time)
+        if self.path is not None or self.measurement.simulated or size == 0:
+            return np.zeros((count, 0))
+        modes = min(count, _MOST_MODES, int(np.ceil(2 * _FASTEST_MODE * self.time[-1])))
+        places = np.pi * (np.arange(count) + 0.5) / count
+        cosines = np.sqrt(2 / count) * size * np.cos(np.outer(np.arange(modes), places))
+        cosines[0] /= np.sqrt(2)
+        pushes = np.array(
+            [_means(self.measurement, row, self.grid, self.held["torque"]) for row in cosines]
+        )
+        torques = self.torque + np.concatenate([pushes, np.zeros((1, len(self.grid)))])
+        disturbed = replace(self, torque=torques).predict([joint] * len(torques), offsets, delays)
+        return np.asarray((disturbed[:-1] - disturbed[-1]).T)
 
 
 def make_trial(
@@ -187,8 +188,7 @@ def make_trial(
     Raises:
         ValueError: What is to be predicted never changes.
     """
-    still = np.ptp(measurement.angle) < _HELD
-    quantity = predict or ("torque" if still else "angle")
+    quantity = predict or ("torque" if _is_still(measurement.angle) else "angle")
     if np.ptp(getattr(measurement, quantity)) == 0:
         raise ValueError(
             f"{measurement.source}: the {quantity} never changes, so there is nothing to "
@@ -241,11 +241,16 @@ def _interval(time: _Values) -> float:
     return interval
 
 
+def _is_still(angle: _Values) -> bool:
+    """Whether a joint is held: but for noise, as 19 of 20 samples show, it does not move."""
+    return float(np.ptp(np.quantile(angle, (0.025, 0.975)))) < _HELD
+
+
 def _smooth_path(time: _Values, angle: _Values, grid: _Values) -> _Values:
     from scipy.signal import butter, sosfiltfilt
 
     path = np.interp(grid, time, angle)
-    if np.ptp(path) < _HELD:
+    if _is_still(angle):
         return np.full_like(path, float(np.mean(path)))
     timestep = float(grid[1])
     cutoff = min(_SMOOTHING, 0.4 / float(np.median(np.diff(time))))
