@@ -40,7 +40,8 @@ class Trial:
         held: By input, each muscle and ``torque``: whether a value lasts until the next sample,
             or straight lines join them.
         torque: External torque over each step [N·m], shape (S,), or (K, S) for K joints.
-        path: Angle at each step [rad] where the torque is predicted, shape (S,); else None.
+        path: Angle at each step [rad] where the torque is predicted, shape (S,), or (K, S) for K
+            joints; else None.
         start: Angle [rad] and velocity [rad/s] at time 0, shape (2,).
         start_spread: Their standard deviations, shape (2,).
         finer: The same with shorter steps; None for a recording of a simulation, whose steps are
@@ -144,10 +145,11 @@ class Trial:
     def input_errors(
         self, joint: Joint, offsets: _Values, delays: _Values | None = None
     ) -> _Values:
-        """What noise of the measured torque does to a prediction, shape (T, K).
+        """What noise of the measured torque, or of the path, does to a prediction, shape (T, K).
 
         The noise is white over the samples, of the size that they show. It is taken apart into
-        cosines, each of its own random size. Slow ones come first; fast ones move no joint.
+        cosines, each of its own random size, the slow ones first. Fast ones move no joint, and
+        are smoothed out of a path.
 
         Args:
             joint: The joint.
@@ -156,22 +158,33 @@ class Trial:
 
         Returns:
             For each cosine, of a size of one standard deviation, what it adds. None (K = 0) where
-            the torque is predicted, or has no noise.
+            that input has no noise.
         """
-        size = white_noise(self.measurement.torque)
-        count = len(self.time)
-        if self.path is not None or self.measurement.simulated or size == 0:
+        count, measurement = len(self.time), self.measurement
+        given = measurement.torque if self.path is None else measurement.angle
+        size = white_noise(given)
+        if measurement.simulated or size == 0:
             return np.zeros((count, 0))
-        modes = min(count, _MOST_MODES, int(np.ceil(2 * _FASTEST_MODE * self.time[-1])))
+        fastest = _FASTEST_MODE if self.path is None else _SMOOTHING
+        modes = min(count, _MOST_MODES, int(np.ceil(2 * fastest * self.time[-1])))
+        if self.path is not None and _is_still(given):
+            modes = 1  # all that is used is the mean
         places = np.pi * (np.arange(count) + 0.5) / count
         cosines = np.sqrt(2 / count) * size * np.cos(np.outer(np.arange(modes), places))
         cosines[0] /= np.sqrt(2)
-        pushes = np.array(
-            [_means(self.measurement, row, self.grid, self.held["torque"]) for row in cosines]
-        )
-        torques = self.torque + np.concatenate([pushes, np.zeros((1, len(self.grid)))])
-        disturbed = replace(self, torque=torques).predict([joint] * len(torques), offsets, delays)
-        return np.asarray((disturbed[:-1] - disturbed[-1]).T)
+        disturbed = self._disturbed(np.concatenate([cosines, np.zeros((1, count))]))
+        found = disturbed.predict([joint] * (modes + 1), offsets, delays)
+        return np.asarray((found[:-1] - found[-1]).T)
+
+    def _disturbed(self, rows: _Values) -> Trial:
+        """The same with K series more, shape (K, T), on the torque or path, for K joints."""
+        if self.path is None:
+            more = [_means(self.measurement, row, self.grid, self.held["torque"]) for row in rows]
+            return replace(self, torque=self.torque + np.array(more))
+        if _is_still(self.measurement.angle):
+            return replace(self, path=self.path + rows.mean(axis=1)[:, None])
+        smooth = [_smoothed(self.time, row, self.grid) for row in rows]
+        return replace(self, path=self.path + np.array(smooth))
 
 
 def make_trial(
@@ -211,7 +224,7 @@ def make_trial(
         steps = int(np.ceil(time[-1] / step - 1e-6))  # free of rounding
         grid: _Values = np.arange(steps + 1, dtype=np.float64) * step
         torque = _means(measurement, measurement.torque, grid, held["torque"])
-        path = _smooth_path(time, measurement.angle, grid) if quantity == "torque" else None
+        path = _path(time, measurement.angle, grid) if quantity == "torque" else None
         return Trial(measurement, quantity, time, grid, held, torque, path, *start, finer)
 
     return at(timestep, None if measurement.simulated else at(timestep / _REFINEMENT, None))
@@ -246,12 +259,17 @@ def _is_still(angle: _Values) -> bool:
     return float(np.ptp(np.quantile(angle, (0.025, 0.975)))) < _HELD
 
 
-def _smooth_path(time: _Values, angle: _Values, grid: _Values) -> _Values:
+def _path(time: _Values, angle: _Values, grid: _Values) -> _Values:
+    """Angle at each step of a grid: smoothed, or the mean where the joint is held."""
+    if _is_still(angle):
+        return np.full_like(grid, float(np.mean(angle)))
+    return _smoothed(time, angle, grid)
+
+
+def _smoothed(time: _Values, angle: _Values, grid: _Values) -> _Values:
     from scipy.signal import butter, sosfiltfilt
 
     path = np.interp(grid, time, angle)
-    if _is_still(angle):
-        return np.full_like(path, float(np.mean(path)))
     timestep = float(grid[1])
     cutoff = min(_SMOOTHING, 0.4 / float(np.median(np.diff(time))))
     sections = butter(2, cutoff, fs=1 / timestep, output="sos")

@@ -67,7 +67,7 @@ def joint_angles(
 def driving_torques(
     joints: Sequence[Joint],
     *,
-    path: _Values,
+    path: ArrayLike,
     before: ArrayLike = 0.0,
     excitation: ArrayLike,
     timestep: float = 1e-3,
@@ -80,7 +80,7 @@ def driving_torques(
 
     Args:
         joints: N joints, as in ``joint_angles``.
-        path: Angle at every step [rad], shape (T,).
+        path: Angle at every step [rad], shape (T,), or (N, T) for a path each.
         before: As in ``joint_angles``.
         excitation: Excitation of each muscle over each step [-], broadcast to (N, T, muscles).
         timestep: Length of a step [s].
@@ -89,17 +89,18 @@ def driving_torques(
         UnmeasuredError: MuJoCo warned that a simulation went bad.
     """
     # the mean velocity over the last step, which is what the muscles have experienced
-    speed = np.diff(path, prepend=path[0]) / timestep
-    acceleration = np.gradient(np.gradient(path, timestep), timestep)
-    inertial = np.outer([joint.inertia for joint in joints], acceleration)
-    muscles = len(joints[0].muscles)
-    inputs = np.empty((len(joints), len(path), muscles + 1))
+    paths = np.atleast_2d(np.asarray(path, dtype=np.float64))
+    speed = np.diff(paths, prepend=paths[:, :1]) / timestep
+    acceleration = np.gradient(np.gradient(paths, timestep, axis=1), timestep, axis=1)
+    inertial = np.array([[joint.inertia] for joint in joints]) * acceleration
+    muscles, steps = len(joints[0].muscles), paths.shape[1]
+    inputs = np.empty((len(joints), steps, muscles + 1))
     inputs[:, :, :muscles] = excitation
-    inputs[:, :, muscles] = _CLAMP * np.diff(speed, append=speed[-1]) / timestep
+    inputs[:, :, muscles] = _CLAMP * np.diff(speed, append=speed[:, -1:]) / timestep
     with installed():
-        batch = _batch(joints, path[0], 0.0, before, timestep, armature=_CLAMP)
+        batch = _batch(joints, paths[:, 0], 0.0, before, timestep, armature=_CLAMP)
         forces = batch.rollout(
-            len(path), inputs, CONTROL_AND_TORQUE, record=("qfrc_passive", "qfrc_actuator")
+            steps, inputs, CONTROL_AND_TORQUE, record=("qfrc_passive", "qfrc_actuator")
         )
     check_batch(batch, joints[0])
     passive, active = (forces[name][:, :, 0] for name in ("qfrc_passive", "qfrc_actuator"))
