@@ -130,7 +130,9 @@ def value_of(joint: Joint, free: Free) -> float:
 
 
 _DIFFERENCE = 1e-5  # of a parameter, in its standard deviations, for derivatives
+_SETTLED = 1e-3  # of the change for slopes: a step so short is the last
 _ITERATIONS = 200
+_UNLIKE = 1e-3  # fall of the cost, a logarithm of likelihood, in which two points still differ
 _NEAR = 1e-6  # of a bound, in standard deviations
 CONFIDENT = 1.96  # standard deviations to either side that hold 95 % of a normal distribution
 
@@ -253,11 +255,12 @@ def solve(
         all_residuals,
         bounds,
         eps=difference,
+        xtol=_SETTLED * difference,
         max_iter=_ITERATIONS,
         verbose=mujoco.minimize.Verbosity.SILENT,
         iter_callback=report,
     )
-    if len(trace) >= _ITERATIONS:
+    if len(trace) >= _ITERATIONS and trace[-2].reduction > _UNLIKE:
         raise RuntimeError(f"the fit did not settle in {_ITERATIONS} iterations")
     point = point.reshape(count, 1)
     found = all_residuals(point)
