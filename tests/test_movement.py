@@ -230,14 +230,15 @@ def test_pulses_of_a_stimulator_are_held_from_sample_to_sample(subject, rate):
         assert abs(one.value - value_of(subject, free)) < one.high - one.low, free.name
 
 
-def test_joined_pulses_would_come_half_a_sample_early(subject):
+def test_joined_pulses_come_half_a_sample_early(subject):
     measurement = really(subject, 200, pulses)
-    result, _ = from_measurements("elbow", [measurement], only=TIMES[-1:], inputs="join")
-    (tau,) = result.estimates
-    truth = subject.muscles["elbow_flexor"].excitation_tau
-    # 2.5 ms, of which the time constant takes its part
-    assert truth + 1e-3 < tau.low
-    assert tau.value < truth + 4e-3
+    taus = {}
+    for way in ("hold", "join"):
+        result, (prediction,) = from_measurements("elbow", [measurement], only=TIMES, inputs=way)
+        assert prediction.inputs == {"hold": "held", "join": "joined"}[way]
+        taus[way] = result.estimates[-1].value
+    # the time constant makes up for the 2.5 ms
+    assert taus["join"] - taus["hold"] == pytest.approx(2.5e-3, abs=0.7e-3)
 
 
 def test_a_delay_of_the_output_is_found(subject):
@@ -249,9 +250,9 @@ def test_a_delay_of_the_output_is_found(subject):
     assert prediction.error == pytest.approx(NOISE, rel=0.2)
     assert len(result.estimates) == len(result.free) == len(INFORMED)
     assert "\ndelay: 0.0" in str(result)
-    late, _ = from_measurements("elbow", [measurement], only=TIMES)
-    assert late.delay is None
-    assert late.estimates[-1].at_bound  # takes what it can of the delay
+    without, (prediction,) = from_measurements("elbow", [measurement], only=TIMES)
+    assert without.delay is None
+    assert prediction.error > 5 * NOISE
 
 
 def test_noise_of_a_measured_torque_widens_the_intervals(subject):
@@ -261,8 +262,9 @@ def test_noise_of_a_measured_torque_widens_the_intervals(subject):
     quiet, _ = from_measurements("elbow", [measurement], only=INFORMED)
     shaken, _ = from_measurements("elbow", [replace(measurement, torque=noise)], only=INFORMED)
     for one, other, free in zip(quiet.estimates, shaken.estimates, quiet.free, strict=True):
-        assert other.high - other.low > 2 * (one.high - one.low), one.name
-        assert other.low <= value_of(subject, free) <= other.high, one.name
+        width = other.high - other.low
+        assert width > 2 * (one.high - one.low), one.name
+        assert abs(other.value - value_of(subject, free)) < width, one.name
 
 
 def test_smooth_inputs_go_straight_between_samples(subject):

@@ -11,6 +11,7 @@ _LEAST = 1e-4  # of the spread of what is predicted: no simulation is nearer to 
 _WINDOW = 5.0  # correlation times over which the autocorrelation of residuals is summed
 _DIFFERENCES = 4  # of samples, after which next to nothing but noise is left of a smooth signal
 _ROUNDS = 20  # in which the noise of the output is told from that of the input
+_NOTHING = 1e-10  # of the largest variance
 _NORMAL = 0.6745  # median of the size of a standard normal number
 
 _Values = NDArray[np.float64]
@@ -56,7 +57,7 @@ def noise_of(left: _Values, errors: _Values, parameters: float, spread: float) -
         spread: Largest less smallest of what is predicted, in the unit of the residuals.
     """
     count = max(left.size - parameters, 0.5 * left.size)
-    basis, sizes, _ = np.linalg.svd(errors, full_matrices=False)
+    basis, sizes = _shapes(errors)
     noise = np.inf
     for _ in range(_ROUNDS):
         before = noise
@@ -66,6 +67,14 @@ def noise_of(left: _Values, errors: _Values, parameters: float, spread: float) -
         if abs(noise - before) < 1e-3 * noise:
             break
     return Noise(1.0 / (noise * float(np.sqrt(correlation_time(rest)))), basis, shares)
+
+
+def _shapes(errors: _Values) -> tuple[_Values, _Values]:
+    """Orthonormal shapes, (T, K), and sizes, (K,), of errors; those of no size are left out."""
+    squares, turned = np.linalg.eigh(errors.T @ errors)
+    kept = squares > _NOTHING * squares.max(initial=0.0)
+    sizes = np.sqrt(squares[kept])
+    return errors @ turned[:, kept] / sizes, sizes
 
 
 def correlation_time(left: _Values) -> float:
