@@ -186,6 +186,16 @@ def test_driven_joints_do_not_disturb_each_other(elbow):
         np.testing.assert_array_equal(row, driving_torques([joint], **inputs)[0])
 
 
+def test_each_joint_may_have_a_path_and_excitations_of_its_own(elbow):
+    joints = varied(elbow)[:2]
+    paths = np.stack([1.0 + 0.2 * np.sin(10 * TIME), 0.9 + 0.1 * np.cos(6 * TIME)])
+    excitation = np.random.default_rng(6).uniform(0, 1, (2, len(TIME), 2))
+    together = driving_torques(joints, path=paths, excitation=excitation)
+    for joint, path, inputs, row in zip(joints, paths, excitation, together, strict=True):
+        alone = driving_torques([joint], path=path, excitation=inputs)[0]
+        np.testing.assert_array_equal(row, alone)
+
+
 # --- callbacks
 
 
