@@ -233,10 +233,16 @@ def compare(
 @click.option(
     "--count",
     type=click.IntRange(1),
-    help="sweep: systems of each kind; fuzz, checks: models; endurance: steps.",
+    help="sweep: systems of each kind; fuzz, checks: models; endurance: steps; intervals: fits.",
 )
-@click.option("--kind", multiple=True, help="sweep, fuzz: kind of model; several are possible.")
-@click.option("--case", metavar="KIND:NUMBER", help="sweep, fuzz, checks: run one model again.")
+@click.option(
+    "--kind", multiple=True,
+    help="sweep, fuzz: kind of model; intervals: kind of inputs; several are possible.",
+)  # fmt: skip
+@click.option(
+    "--case", metavar="KIND:NUMBER",
+    help="sweep, fuzz, checks: run one model again; intervals: one fit, JOINT:KIND:RATE:NUMBER.",
+)  # fmt: skip
 @json_option
 def bench(
     names: tuple[str, ...],
@@ -252,7 +258,8 @@ def bench(
 
     More benchmarks, one at a time, with their time on two cores: sweep, random systems against
     the reference solver (2 minutes); fuzz, 100,000 random models (5 minutes); checks, check_model
-    on sound and unsound models (3 minutes); endurance, 10⁸ steps (2 minutes).
+    on sound and unsound models (3 minutes); endurance, 10⁸ steps (2 minutes); intervals, 900
+    simulated measurements fitted back (15 minutes).
     """
     from mjhill import benchmarks
 

@@ -81,8 +81,14 @@ def header(results: Sequence[Identified], parameters: str | Path | None) -> str:
                 f"    {len(one)} rows, {item.quantity} predicted, "
                 f"{100 * item.explained:.2f} % of its variance explained"
             )
+            lines.append(f"    inputs between rows: {item.inputs}")
             lines += [f"    {note}" for note in one.notes]
         lines.append(f"  fitted: {', '.join(one.name for one in result.estimates)}")
+        if late := result.delay:
+            lines.append(
+                f"  with a delay of the excitations of {late.value:.4g} s, 95 % interval "
+                f"{late.low:.4g} to {late.high:.4g}, which the joint below does not have"
+            )
         unknown = [one.name for one in result.estimates if one.informed < INFORMED]
         if unknown:
             lines.append(
