@@ -9,6 +9,7 @@ import pytest
 import mjhill
 from mjhill.identification import FitError
 from mjhill.identification.measurement import Measurement
+from mjhill.identification.movement import Prediction
 from mjhill.lab.rig import at_rest, build_rig, record_run
 
 
@@ -68,6 +69,20 @@ def test_a_common_fault_is_named(measured, fault, cause):
     assert cause in message
     assert "Then 100 % are explained even before the fit" in message
     assert caught.value.result.predictions[0].explained < 0.5
+
+
+def test_an_offset_explains_nothing(measured):
+    angle = measured.angle
+    spread = float(np.std(angle))
+
+    def explained(predicted):
+        return Prediction(measured, "angle", angle, predicted).explained
+
+    assert explained(angle) == 1.0
+    assert explained(angle + 0.5 * spread) == pytest.approx(0.75)
+    assert explained(angle + spread) == pytest.approx(0.0)
+    assert explained(np.full_like(angle, angle.mean())) == pytest.approx(0.0)
+    assert explained(angle + 2 * spread) == pytest.approx(-3.0)
 
 
 def test_a_fault_that_is_none_of_the_common_ones_says_where_to_look(measured):

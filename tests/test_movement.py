@@ -286,7 +286,7 @@ def test_the_intervals_of_a_muscle_at_rest_hold_what_agrees_as_well(subject):
     result, _ = from_measurements("elbow", [measured(noisy(moved(subject)))], only=(*ONLY, resting))
     estimate = next(e for e in result.estimates if e.name == resting)
     assert estimate.low <= subject.muscles["elbow_extensor"].max_velocity <= estimate.high
-    assert estimate.informed < 0.8  # 0.93 by the covariance
+    assert estimate.informed < 0.9  # 0.96 by the covariance, and the true one outside
 
 
 def test_a_measurement_may_begin_with_a_gap(subject):

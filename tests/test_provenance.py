@@ -7,6 +7,7 @@ import pytest
 
 import mjhill
 from mjhill import identification
+from mjhill.identification.free import free_parameters
 from mjhill.joints.reader import parameter_file, read_joints
 from mjhill.lab.rig import at_rest, build_rig, record_run
 
@@ -55,9 +56,10 @@ def test_a_fitted_value_names_the_file_its_hash_and_where_its_bounds_come_from(f
 def test_a_value_that_the_data_do_not_inform_says_so(file, written):
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     _, untold = sources(written)
+    bounds = {one.name: f"{one.low:g} to {one.high:g}" for one in free_parameters("elbow")}
     assert untold.startswith(
         f"not informed by trial.csv (SHA-256 {digest[:12]}): 0 % from the data, so the value is "
-        "that of the bounds 0.028 to 0.045; bounds: "
+        f"that of the bounds {bounds[ONLY[1]]}; bounds: "
     )
 
 
@@ -68,6 +70,7 @@ def test_the_top_of_the_file_says_how_it_was_made(file, written):
     assert f"# elbow: fitted by mjhill {mjhill.__version__}, mjhill.identify" in head
     assert f"#   trial.csv: SHA-256 {digest}," in head
     assert "301 rows, angle predicted, 100.00 % of its variance explained" in head
+    assert "#     inputs between rows: held\n" in head
     assert f"#   fitted: {', '.join(ONLY)}\n" in head
     assert "less than 10 % from the data and so the value of the bounds: elbow_extensor.exc" in head
     assert "is that of joints.toml, which comes with mjhill." in head

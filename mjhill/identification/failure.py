@@ -84,10 +84,12 @@ def _fault(prediction: Prediction, joint: Joint, quantity: str | None, inputs: s
         )
     else:
         text += f" Then {100 * share:.0f} % are explained even before the fit"
-    return (
-        f"{measurement.source}: {100 * prediction.explained:,.0f} % of the variance of its "
-        f"{prediction.quantity} explained; {text}"
+    found = (
+        f"{100 * prediction.explained:.0f} % of the variance of its {prediction.quantity} explained"
     )
+    if prediction.explained < 0:
+        found = f"its {prediction.quantity} is predicted worse than by its mean"
+    return f"{measurement.source}: {found}; {text}"
 
 
 def _changes(measurement: Measurement, joint: Joint) -> Iterator[tuple[str, Measurement]]:

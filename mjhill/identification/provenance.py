@@ -86,8 +86,8 @@ def header(results: Sequence[Identified], parameters: str | Path | None) -> str:
         lines.append(f"  fitted: {', '.join(one.name for one in result.estimates)}")
         if late := result.delay:
             lines.append(
-                f"  with a delay of the excitations of {late.value:.4g} s, 95 % interval "
-                f"{late.low:.4g} to {late.high:.4g}, which the joint below does not have"
+                f"  delay of the excitations, not part of the joint: {late.value:.4g} s, "
+                f"95 % interval {late.low:.4g} to {late.high:.4g}"
             )
         unknown = [one.name for one in result.estimates if one.informed < INFORMED]
         if unknown:
