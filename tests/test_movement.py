@@ -236,6 +236,8 @@ def test_joined_pulses_come_half_a_sample_early(subject):
     for way in ("hold", "join"):
         result, (prediction,) = from_measurements("elbow", [measurement], only=TIMES, inputs=way)
         assert prediction.inputs == {"hold": "held", "join": "joined"}[way]
+        # what is left is noise only where the inputs are right
+        assert bool(prediction.notes) == (way == "join")
         taus[way] = result.estimates[-1].value
     # the time constant makes up for the 2.5 ms
     assert taus["join"] - taus["hold"] == pytest.approx(2.5e-3, abs=0.7e-3)

@@ -371,6 +371,6 @@ class Identified:
                 f"{one.name}: {one.value:.4g}, {one.low:.3g} to {one.high:.3g}, {one.informed:.0%}"
             )
         for prediction in self.predictions:
-            measurement = prediction.measurement
-            lines += [f"note: {measurement.source}: {note}" for note in measurement.notes]
+            source = prediction.measurement.source
+            lines += [f"note: {source}: {note}" for note in prediction.notes]
         return "\n".join(lines)

@@ -26,6 +26,8 @@ _DIFFERENCE = 1e-3  # standard deviations; shorter ones find the kinks of a simu
 _SETTLED = 1e-6  # standard deviations: a step so short is the last
 _STIFFEST = 1e8  # regularisation at which a fit ends; data without noise have steep residuals
 _SAME = 0.02  # of the noise, by which it may still change
+_TOGETHER = 4.0  # residuals that count as one, from here on they are not called noise
+_SMALL = 1e-3  # of the spread of what is predicted, too little to be remarked on
 _OFF = 0.1  # standard deviations of all data together, by which a correction may still change
 
 _Values = NDArray[np.float64]
@@ -41,6 +43,8 @@ class Prediction:
         measured: That quantity as measured, shape (T,).
         predicted: As predicted.
         inputs: How the inputs were taken to go on between samples, in words.
+        together: Number of residuals that count as one, as they hang together; near 1 if only
+            noise is left.
     """
 
     measurement: Measurement
@@ -48,6 +52,7 @@ class Prediction:
     measured: _Values
     predicted: _Values
     inputs: str = ""
+    together: float = 1.0
 
     @property
     def error(self) -> float:
@@ -62,6 +67,19 @@ class Prediction:
         that is worse than the mean of the measurement.
         """
         return 1.0 - self.error**2 / float(np.var(self.measured))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was done to the numbers of the file, and what is odd about the rest, for people."""
+        notes = self.measurement.notes
+        if self.together < _TOGETHER or self.error < _SMALL * float(np.ptp(self.measured)):
+            return notes
+        return (
+            *notes,
+            f"what is left is no noise, as it hangs together over {self.together:.0f} samples: "
+            "maybe inputs are held or joined wrongly, excitations act late (a delay), or a "
+            "parameter that is not fitted is wrong; intervals do not show such errors",
+        )
 
 
 def from_measurements(
@@ -139,11 +157,13 @@ def fit_trials(
         RuntimeError: The fit did not settle.
     """
     problem = _Problem(joint, tuple(free), tuple(trials), delay)
-    solution, ends, predicted = _solve(problem, progress)
+    solution, ends, predicted, noises = _solve(problem, progress)
     fitted = problem.joints(solution.deviations[:, None])[0]
     predictions = [
-        Prediction(trial.measurement, trial.quantity, trial.measured, values, trial.inputs)
-        for trial, values in zip(trials, predicted, strict=True)
+        Prediction(
+            trial.measurement, trial.quantity, trial.measured, values, trial.inputs, noise.together
+        )
+        for trial, values, noise in zip(trials, predicted, noises, strict=True)
     ]
     estimates = solution.estimates([*free, DELAY] if delay else free, ends)
     late = estimates.pop() if delay else None
@@ -238,11 +258,12 @@ class _Problem:
 
 def _solve(
     problem: _Problem, progress: Callable[[float], None] | None
-) -> tuple[Solution, _Values, list[_Values]]:
+) -> tuple[Solution, _Values, list[_Values], list[Noise]]:
     """Fit, take the noise from what is left, and fit again until it no longer changes.
 
     Returns:
-        The solution, the ends of the intervals of confidence, and what the solution predicts.
+        The solution, the ends of the intervals of confidence, what the solution predicts, and
+        the noise that it leaves.
     """
     trials, count = problem.trials, problem.count
     noises = [white(1.0 / (_FIRST_NOISE * trial.spread), len(trial.time)) for trial in trials]
@@ -288,7 +309,7 @@ def _solve(
             break
         noises, missed = found, [more for more, _ in known]
     solution = over_uncertainty(residuals, solution)
-    return solution, intervals(residuals, solution, problem.wanted), predicted
+    return solution, intervals(residuals, solution, problem.wanted), predicted, found
 
 
 def _alike(new: Noise, old: Noise) -> bool:

@@ -25,11 +25,13 @@ class Noise:
         scale: Weight of a residual, one over the standard deviation of the white noise.
         basis: Orthonormal shapes in which the input's noise appears, shape (T, K).
         shares: Share by which the residuals shrink along each, shape (K,).
+        together: Number of residuals that count as one, as they hang together.
     """
 
     scale: float
     basis: _Values
     shares: _Values
+    together: float = 1.0
 
     def whiten(self, residuals: _Values) -> _Values:
         """Residuals in units of their standard deviations, independent, shape (..., T)."""
@@ -66,7 +68,8 @@ def noise_of(left: _Values, errors: _Values, parameters: float, spread: float) -
         noise = max(float(np.sqrt(rest @ rest / count)), _LEAST * spread)
         if abs(noise - before) < 1e-3 * noise:
             break
-    return Noise(1.0 / (noise * float(np.sqrt(correlation_time(rest)))), basis, shares)
+    together = correlation_time(rest)
+    return Noise(1.0 / (noise * float(np.sqrt(together))), basis, shares, together)
 
 
 def _shapes(errors: _Values) -> tuple[_Values, _Values]:

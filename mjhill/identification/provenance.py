@@ -82,7 +82,7 @@ def header(results: Sequence[Identified], parameters: str | Path | None) -> str:
                 f"{100 * item.explained:.2f} % of its variance explained"
             )
             lines.append(f"    inputs between rows: {item.inputs}")
-            lines += [f"    {note}" for note in one.notes]
+            lines += [f"    {note}" for note in item.notes]
         lines.append(f"  fitted: {', '.join(one.name for one in result.estimates)}")
         if late := result.delay:
             lines.append(

@@ -127,7 +127,7 @@ def prediction_rows(predictions: Sequence[Prediction]) -> list[dict[str, Any]]:
                 "rms error": degrees(item.error) if angle else item.error,
                 "unit": "°" if angle else "N·m",
                 "variance explained [%]": 100 * item.explained,
-                "notes": list(item.measurement.notes),
+                "notes": list(item.notes),
             }
         )
     return rows
