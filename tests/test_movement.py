@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.identification.free import value_of
+from mjhill.identification.free import free_parameters, value_of
 from mjhill.identification.measurement import Measurement, read_measurement
-from mjhill.identification.movement import from_measurements
+from mjhill.identification.movement import _Problem, from_measurements
+from mjhill.identification.trial import make_trial
 from mjhill.lab.batch import joint_angles
-from mjhill.lab.rig import at_rest, build_rig, record_run
+from mjhill.lab.rig import UnmeasuredError, at_rest, build_rig, record_run
 from mjhill.simulate.reference import plant_torque
 
 NOISE = 0.003  # [rad], that of optical motion capture
@@ -289,6 +290,25 @@ def test_the_intervals_of_a_muscle_at_rest_hold_what_agrees_as_well(subject):
     estimate = next(e for e in result.estimates if e.name == resting)
     assert estimate.low <= subject.muscles["elbow_extensor"].max_velocity <= estimate.high
     assert estimate.informed < 0.9  # 0.96 by the covariance, and the true one outside
+
+
+def test_a_simulation_that_goes_bad_is_far_from_the_measurement(elbow, subject, monkeypatch):
+    trial = make_trial(measured(moved(subject)))
+    free = next(one for one in free_parameters("elbow") if one.name == "damping")
+    problem = _Problem(elbow, (free,), (trial,), delay=False)
+    points = np.zeros((problem.count, 3))
+    points[0] = [-1.0, 0.0, 1.0]
+    (sound,) = problem.predictions(points)
+
+    def run(joints, **inputs):
+        if any(joint.damping == free.value(0.0) for joint in joints):
+            raise UnmeasuredError("elbow: MuJoCo warned 'badqacc'")
+        return joint_angles(joints, **inputs)
+
+    monkeypatch.setattr("mjhill.identification.trial.joint_angles", run)
+    (found,) = problem.predictions(points)
+    np.testing.assert_array_equal(found[[0, 2]], sound[[0, 2]])
+    assert np.abs(found[1] - trial.measured).min() == pytest.approx(10 * trial.spread)
 
 
 def test_a_measurement_may_begin_with_a_gap(subject):

@@ -17,6 +17,7 @@ from mjhill.identification.noise import Noise, noise_of, white
 from mjhill.identification.trial import Trial, make_trial
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import read_joints
+from mjhill.lab.rig import UnmeasuredError
 
 QUANTITIES = ("angle", "torque")  # what can be predicted
 DELAY = Free(("delay",), 0.0, 0.1)  # [s], bounds of that of a measured output
@@ -26,6 +27,7 @@ _DIFFERENCE = 1e-3  # standard deviations; shorter ones find the kinks of a simu
 _SETTLED = 1e-6  # standard deviations: a step so short is the last
 _STIFFEST = 1e8  # regularisation at which a fit ends; data without noise have steep residuals
 _SAME = 0.02  # of the noise, by which it may still change
+_FAR = 10.0  # times the spread of what is predicted
 _TOGETHER = 4.0  # residuals that count as one, from here on they are not called noise
 _SMALL = 1e-3  # of the spread of what is predicted, too little to be remarked on
 _OFF = 0.1  # standard deviations of all data together, by which a correction may still change
@@ -234,12 +236,22 @@ class _Problem:
         return [(*pair, delays) for pair in zip(self.trials, offsets, strict=True)]
 
     def predictions(self, points: _Values) -> list[_Values]:
-        """What K points predict of each trial, shape (K, T)."""
+        """What K points predict of each trial, shape (K, T).
+
+        Where a simulation goes bad, as it may far from a solution, it is far from what was
+        measured.
+        """
         joints = self.joints(points)
-        return [
-            trial.predict(joints, offsets, delays)
-            for trial, offsets, delays in self._settings(points)
-        ]
+        try:
+            return [
+                trial.predict(joints, offsets, delays)
+                for trial, offsets, delays in self._settings(points)
+            ]
+        except UnmeasuredError:
+            if len(joints) == 1:
+                return [(one.measured + _FAR * one.spread)[None] for one in self.trials]
+        alone = [self.predictions(point[:, None]) for point in points.T]
+        return [np.concatenate(rows) for rows in zip(*alone, strict=True)]
 
     def known(self, point: _Values) -> list[tuple[_Values, _Values]]:
         """At a point, for each trial: its correction and the errors of its input.
