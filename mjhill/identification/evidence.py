@@ -24,7 +24,8 @@ STARTS = ("relaxed", "held")
 
 # standard deviations of what the fit compares; those of facts are published
 MAGNITUDE_SPREAD = 0.025  # of MAG
-DELAY_SPREAD = 0.1  # of T1 + T2
+DELAY_SPREAD = 0.08  # of T1 + T2
+FACT = 2.0  # weight of a fact, whose standard deviation is published
 _UNMEASURED = 5.0  # deviation of what cannot be measured
 _SHAPE_SAMPLES = 60
 _SETTLED = 5.0  # duration of a run, in units of the largest T1 + T2 ...
@@ -142,7 +143,7 @@ def _fact_residuals(fact: Entry, joints: Sequence[Joint], memory: Memory | None)
         values = measure(fact, joints, memory)
     except UnmeasuredError:
         return np.full((len(joints), 1), _UNMEASURED)
-    return np.asarray(fact.deviation(values)[:, None])
+    return np.asarray(FACT * fact.deviation(values)[:, None])
 
 
 def evidence_on(

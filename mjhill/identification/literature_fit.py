@@ -18,7 +18,7 @@ from mjhill.joints.joint import Joint
 from mjhill.joints.reader import read_joints
 from mjhill.literature.facts import Entry
 
-PRIOR = 0.5  # weight of the priors
+PRIOR = 0.6  # weight of the priors
 _LIGAMENTS = 1.0  # where k1 starts, in deviations: with none at all, a fit can miss them
 _DIFFERENCE, _TOLERANCE = 1e-2, 1e-4  # for derivatives, and of the fit [standard deviations]
 
