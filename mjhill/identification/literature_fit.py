@@ -96,15 +96,29 @@ def _begin(free: Sequence[Free]) -> _Values:
     return np.array([_LIGAMENTS if item.path[-1] in ("k1_pos", "k1_neg") else 0.0 for item in free])
 
 
-def check_evidence(joints: Iterable[str], parameters: str | Path | None = None) -> None:
+def check_evidence(
+    joints: Iterable[str],
+    parameters: str | Path | None = None,
+    fixed: Mapping[str, float] = MappingProxyType({}),
+) -> None:
     """Refuse joints without published data, before long work on others.
 
+    Args:
+        joints: Their names.
+        parameters: The parameter file; by default the one that comes with mjhill.
+        fixed: Parameters that are to be fixed, and their values.
+
     Raises:
-        ValueError: There is such a joint; the message names it.
+        ValueError: There is such a joint, or it does not have what is to be fixed; the message
+            names it.
     """
     known = read_joints(parameters)
     for name in joints:
         _evidence(known[name])
+        try:
+            pin(free_parameters(name, parameters), fixed)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
 
 
 def _evidence(

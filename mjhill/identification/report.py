@@ -10,10 +10,11 @@ from typing import Any
 from mjhill.files import check_writable, replacing
 from mjhill.identification.facts import facts
 from mjhill.identification.fit import Identified
-from mjhill.identification.plots import plot_literature, plot_predictions
+from mjhill.identification.plots import plot_facts, plot_literature, plot_predictions
 from mjhill.identification.provenance import header, pinned_text, source_text
 from mjhill.identification.rows import (
     estimate_rows,
+    fact_counts,
     fact_rows,
     prediction_rows,
     published_rows,
@@ -33,10 +34,11 @@ def output_files(
     Args:
         joints: Names of the fitted joints.
         folder: The folder.
-        measured: Whether all joints are fitted to measurements; then there is no page.
+        measured: Whether all joints are fitted to measurements; then there is no page and no plot
+            of facts.
     """
     folder = Path(folder)
-    page = {} if measured else {"page": folder / "report.md"}
+    page = {} if measured else {"page": folder / "report.md", "facts": folder / "facts.png"}
     return {
         "parameters": folder / "joints.toml",
         "numbers": folder / "identify.json",
@@ -86,9 +88,12 @@ def write(
     fitted = {
         name: written[name] for name, one in zip(names, results, strict=True) if not one.predictions
     }
-    report = _literature_tables(fitted, progress) if fitted else {}
+    starts = {one.joint.name: one.start for one in results}
+    report = _literature_tables(fitted, starts, progress) if fitted else {}
     for name, joint in fitted.items():
-        plot_literature(joint, files[name])
+        plot_literature(joint, files[name], starts[name])
+    if report.get("Facts"):
+        plot_facts(report["Facts"], files["facts"])
     for result in measured:
         plot_predictions(result.joint.name, result.predictions, files[result.joint.name])
         report.setdefault("Measurements", []).extend(prediction_rows(result.predictions))
@@ -100,14 +105,20 @@ def write(
 
 
 def _literature_tables(
-    joints: Mapping[str, Joint], progress: Callable[[float], None] | None
+    joints: Mapping[str, Joint],
+    starts: Mapping[str, str],
+    progress: Callable[[float], None] | None,
 ) -> dict[str, list[dict[str, Any]]]:
+    measured = facts(joints, progress)
     return {
-        "Table 2": [row for joint in joints.values() for row in step_rows(joint)],
+        "Table 2": [
+            row for name, joint in joints.items() for row in step_rows(joint, starts[name])
+        ],
         "Passive torques and ranges of motion": [
             row for joint in joints.values() for row in published_rows(joint)
         ],
-        "Not used by the fit": fact_rows(facts(joints, progress)),
+        "Facts": fact_rows(measured),
+        "Facts counted": fact_counts(measured) if measured else [],
     }
 
 

@@ -133,7 +133,10 @@ def prediction_rows(predictions: Sequence[Prediction]) -> list[dict[str, Any]]:
 
 
 def fact_rows(facts: Sequence[Fact]) -> list[dict[str, Any]]:
-    """Facts that no fit used, as published and as measured in simulation, one row each."""
+    """Facts as published and as measured in simulation, one row each.
+
+    A deviation is in standard deviations from the published mean.
+    """
     return [
         {
             "joint": fact.joint,
@@ -142,7 +145,8 @@ def fact_rows(facts: Sequence[Fact]) -> list[dict[str, Any]]:
             "low": fact.low,
             "high": fact.high,
             "ours": fact.measured,
-            "within": {True: "yes", False: "no", None: "not measured"}[fact.within],
+            "deviation": fact.deviation,
+            "use": "held out" if fact.held_out else "fitted",
             "note": fact.note,
             "source": fact.source,
         }
@@ -150,21 +154,43 @@ def fact_rows(facts: Sequence[Fact]) -> list[dict[str, Any]]:
     ]
 
 
-def brief(joint: Joint, held_out: Sequence[Fact]) -> dict[str, Any]:
+def fact_counts(facts: Sequence[Fact]) -> list[dict[str, Any]]:
+    """How many facts lie within one and two standard deviations: fitted, held out, and all."""
+
+    def row(use: str, chosen: Sequence[Fact]) -> dict[str, Any]:
+        sizes = [abs(fact.deviation) for fact in chosen if fact.deviation is not None]
+        return {
+            "facts": use,
+            "count": len(chosen),
+            "within 1 SD": sum(size <= 1 for size in sizes),
+            "within 2 SD": sum(size <= 2 for size in sizes),
+            "largest [SD]": max(sizes, default=None),
+        }
+
+    fitted = [fact for fact in facts if not fact.held_out]
+    held_out = [fact for fact in facts if fact.held_out]
+    return [row("fitted", fitted), row("held out", held_out), row("all", facts)]
+
+
+def brief(joint: Joint, facts: Sequence[Fact]) -> dict[str, Any]:
     """How well a joint agrees with the literature, in one row.
 
     Args:
         joint: The joint.
-        held_out: Facts that no fit used; those about other joints are ignored.
+        facts: Facts as measured; those about other joints are ignored.
     """
     steps, published = step_rows(joint), published_rows(joint)
-    own = [fact for fact in held_out if fact.joint == joint.name]
+    own = [fact for fact in facts if fact.joint == joint.name]
 
     def worst(key: str) -> float | None:
         return max((abs(row[key]) for row in steps), default=None)
 
     def inside(agreeing: Iterable[bool], count: int) -> str:
         return f"{sum(agreeing)} of {count}" if count else ""
+
+    def facts_inside(chosen: Sequence[Fact]) -> str:
+        sizes = [abs(fact.deviation) for fact in chosen if fact.deviation is not None]
+        return inside((size <= 2 for size in sizes), len(chosen))
 
     return {
         "joint": joint.name,
@@ -173,5 +199,6 @@ def brief(joint: Joint, held_out: Sequence[Fact]) -> dict[str, Any]:
         "passive torques and ranges inside": inside(
             (row["outside by"] is None for row in published), len(published)
         ),
-        "held-out facts inside": inside((fact.within is True for fact in own), len(own)),
+        "fitted facts within 2 SD": facts_inside([fact for fact in own if not fact.held_out]),
+        "held-out facts within 2 SD": facts_inside([fact for fact in own if fact.held_out]),
     }
