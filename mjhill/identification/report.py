@@ -172,7 +172,8 @@ def _cell(value: Any) -> str:
 
 _PREFACE = f"""# Joints beside the literature
 
-Written by `mjhill identify`. It fits the parameters that have bounds in a parameter file to four kinds of published data:
+Written by `mjhill identify`. It fits the parameters that have bounds in a parameter file to four
+kinds of published data:
 
 | data | one standard deviation in the fit |
 |---|---|
@@ -183,13 +184,16 @@ Written by `mjhill identify`. It fits the parameters that have bounds in a param
 | facts that are not held out (`facts.toml`) | half of the published interval, over {FACT:g} |
 | priors: the middle of the bounds | half of the way to a bound, over {PRIOR:g} |
 
-Nothing leaves the bounds, which come from other measurements. The files are in `mjhill/literature`. A **held-out** fact is not
-used by the fit: it tests the result on data that could not influence the parameters. Bounds and weights were chosen by people who
-had seen all facts. Every third fact of a joint is held out, and all of the knee; the head of `facts.toml` states the rule.
+Nothing leaves the bounds, which come from other measurements. The files are in
+`mjhill/literature`. A **held-out** fact is not used by the fit: it tests the result on data that
+could not influence the parameters. Bounds and weights were chosen by people who had seen all
+facts. Every third fact of a joint is held out, and all of the knee; the head of `facts.toml`
+states the rule.
 
-In the tables of the joints, `met` means: MAG within {MAGNITUDE_MET:g} % of Table 2, T1 + T2 within {DELAY_MET:g} %, all else
-within {DEVIATION_MET:g} standard deviations (SD). An interval of a fact is 2 SD wide, one of a passive torque or a range of
-motion 4 SD. `against` says why something is not met, or is more than 1 SD off: it names what gets worse where that is met better.
+In the tables of the joints, `met` means: MAG within {MAGNITUDE_MET:g} % of Table 2, T1 + T2
+within {DELAY_MET:g} %, all else within {DEVIATION_MET:g} standard deviations (SD). An interval of
+a fact is 2 SD wide, one of a passive torque or a range of motion 4 SD. `against` says why
+something is not met, or is more than 1 SD off: it names what gets worse where that is met better.
 `bounds of` a parameter is the prior that keeps it near the middle of its bounds.
 """
 
@@ -197,18 +201,23 @@ _EXPLANATIONS = {
     "Facts counted": """How many facts lie within one and two published standard deviations.
 
 ![Facts in published standard deviations from the published mean](facts.png)""",
-    "Parameters on a bound": """They would leave physiology if they could. `better beyond it` says what would then be met better:
-where that is a row of Table 2, the paper and the source of the bound contradict each other.""",
-    "Table 2": """A step of excitation to one muscle from a posture that Table 2 does not state and the fit finds. The other muscle
-is at rest (`--start held`: it holds the start, and is then switched off). `recoil` is the part of MAG that passive elasticity
-alone gives: the way from the start to rest. MAG, T1 and T2 are those of the overdamped second-order response nearest to the
-simulated one. T1 and T2 singly say little where they are nearly equal or the response swings, marked ill-conditioned: their sum is
-what counts. Published T1 and T2 are corrected where the note says so; a row without a direction holds for both.""",
-    "Passive torques and ranges of motion": """Low and high span what is published, 4 standard deviations.""",
-    "Facts": """Low and high are the published mean less and plus one standard deviation, or what the sources span.""",
-    "Parameters": """SI units. The interval holds the value with 95 % confidence, given the bounds, the data and their stated
-errors, and that the model is right; `from the data` is the share of the prior's variance that the data took away, by the width of
-the interval.""",
+    "Parameters on a bound": """They would leave physiology if they could. `better beyond it` says
+what would then be met better: where that is a row of Table 2, the paper and the source of the
+bound contradict each other.""",
+    "Table 2": """A step of excitation to one muscle from a posture that Table 2 does not state
+and the fit finds. The other muscle is at rest (`--start held`: it holds the start, and is then
+switched off). `recoil` is the part of MAG that passive elasticity alone gives: the way from the
+start to rest. MAG, T1 and T2 are those of the overdamped second-order response nearest to the
+simulated one. T1 and T2 singly say little where they are nearly equal or the response swings,
+marked ill-conditioned: their sum is what counts. Published T1 and T2 are corrected where the note
+says so; a row without a direction holds for both.""",
+    "Passive torques and ranges of motion": """Low and high span what is published, 4 standard
+deviations.""",
+    "Facts": """Low and high are the published mean less and plus one standard deviation, or what
+the sources span.""",
+    "Parameters": """SI units. The interval holds the value with 95 % confidence, given the
+bounds, the data and their stated errors, and that the model is right; `from the data` is the
+share of the prior's variance that the data took away, by the width of the interval.""",
 }
 
 
@@ -225,7 +234,7 @@ def parameter_text(results: Iterable[Identified], parameters: str | Path | None 
     import tomlkit
 
     results = list(results)
-    document = tomlkit.parse(Path(parameters or parameter_file()).read_text(encoding="utf-8"))
+    document = tomlkit.parse(parameter_file(parameters).read_text(encoding="utf-8"))
     for result in results:
         table = document[result.joint.name]
         for free, estimate in zip(result.free, result.estimates, strict=True):
@@ -237,9 +246,11 @@ def parameter_text(results: Iterable[Identified], parameters: str | Path | None 
                     entry["source"] = source_text(result, estimate, str(entry["source"]))
         for free, value in result.pinned:
             for path, here in free.values(value).items():
-                entry = _entry(table, path)
+                before = _entry(table, path)
+                entry = tomlkit.inline_table()
                 entry["value"] = here
-                entry["source"] = pinned_text(str(entry["source"]), entry.pop("bounds"))
+                entry["source"] = pinned_text(str(before["source"]), before["bounds"])
+                _entry(table, path[:-1])[path[-1]] = entry
     return header(results, parameters) + tomlkit.dumps(document)
 
 
