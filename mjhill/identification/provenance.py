@@ -70,7 +70,7 @@ def header(results: Sequence[Identified], parameters: str | Path | None) -> str:
         if not pinned:
             return ""
         listed = ", ".join(f"{name} = {value:g}" for name, value in pinned.items())
-        return f"# Fitted by mjhill identify with fixed: {listed}. Comments below are of the free fit.\n\n"
+        return f"# Made by mjhill identify with --fix: {listed}.\n\n"
     lines = []
     for result in measured:
         lines.append(
