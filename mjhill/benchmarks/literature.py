@@ -160,9 +160,10 @@ def _each_fact(say: Progress) -> Result:
 def _left_out_note(rows: Sequence[Mapping[str, Any]]) -> str:
     left = [row for row in rows if row["use"] == "fitted"]
     sizes = [abs(row["left out"]) for row in left if row["left out"] is not None]
+    one, two = (sum(size <= most for size in sizes) for most in (1, 2))
     return (
-        f"Each fitted fact left out in turn: of {len(left)}, {sum(size <= 1 for size in sizes)} lie "
-        f"within one published standard deviation and {sum(size <= 2 for size in sizes)} within two."
+        f"Each fitted fact left out in turn: of {len(left)}, {one} lie within one published "
+        f"standard deviation and {two} within two."
     )
 
 
