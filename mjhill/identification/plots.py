@@ -70,9 +70,8 @@ def plot_facts(rows: Sequence[Mapping[str, Any]], path: str | Path) -> None:
             if row["use"] == use and row["deviation"] is not None
         ]
         if places:
-            axes.scatter(
-                *zip(*places, strict=True), s=38, color=face, edgecolors=_FACT, label=use, zorder=3
-            )
+            deviations, lines = zip(*places, strict=True)
+            axes.scatter(deviations, lines, s=38, color=face, edgecolors=_FACT, label=use, zorder=3)
     for line, row in enumerate(rows):
         ours = "not measured" if row["ours"] is None else f"{row['ours']:.3g}"
         text = f"{ours} ({row['low']:.3g} to {row['high']:.3g}) {row['unit']}"

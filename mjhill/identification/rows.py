@@ -12,6 +12,7 @@ from mjhill.identification.fit import Identified
 from mjhill.identification.free import Free
 from mjhill.identification.movement import Prediction
 from mjhill.joints.joint import Joint
+from mjhill.literature.published import EndAngle, PassiveTorque
 
 MAGNITUDE_MET, DELAY_MET = 5.0, 15.0
 """Largest difference of MAG and of T1 + T2 from Table 2 that counts as met [%]."""
@@ -123,11 +124,12 @@ def agreement_rows(result: Identified, joint: Joint, facts: Sequence[Fact]) -> l
         ):
             label = f"{name} of {step}"
             against = result.held_back.get(label, "") if abs(off) > most else ""
-            published, ours = (f"{value:.3g}" for value in pair)
-            rows.append(_agreement(f"{label} [{unit}]", published, ours, f"{off:+.1f} %",
+            wanted, ours = (f"{value:.3g}" for value in pair)
+            rows.append(_agreement(f"{label} [{unit}]", wanted, ours, f"{off:+.1f} %",
                                    abs(off) <= most, against))  # fmt: skip
     evidence = evidence_on(joint, start=result.start)
-    spread = [(one.label, one.deviation(joint)) for one in (*evidence.torques, *evidence.ends)]
+    published: list[PassiveTorque | EndAngle] = [*evidence.torques, *evidence.ends]
+    spread = [(one.label, one.deviation(joint)) for one in published]
     for row, (label, off) in zip(published_rows(joint), spread, strict=True):
         rows.append(_spread_agreement(result, label, label, row["low"], row["high"], row["ours"],
                                       off, ""))  # fmt: skip
