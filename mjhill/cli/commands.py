@@ -237,7 +237,8 @@ def compare(
 )
 @click.option(
     "--kind", multiple=True,
-    help="sweep, fuzz: kind of model; intervals: kind of inputs; several are possible.",
+    help="sweep, fuzz: kind of model; intervals: kind of inputs; several are possible; "
+    "literature: variants or facts.",
 )  # fmt: skip
 @click.option(
     "--case", metavar="KIND:NUMBER",
@@ -258,8 +259,9 @@ def bench(
 
     More benchmarks, one at a time, with their time on two cores: sweep, random systems against
     the reference solver (2 minutes); fuzz, 100,000 random models (5 minutes); checks, check_model
-    on sound and unsound models (3 minutes); endurance, 10⁸ steps (2 minutes); intervals, 900
-    simulated measurements fitted back (15 minutes).
+    on sound and unsound models (3 minutes); endurance, 10⁸ steps (2 minutes); literature, the
+    joints fitted in other ways (8 minutes); intervals, 900 simulated measurements fitted back
+    (15 minutes).
     """
     from mjhill import benchmarks
 

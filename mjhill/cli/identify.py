@@ -17,7 +17,8 @@ from mjhill.cli.printing import (
 )
 from mjhill.files import check_writable
 
-_HIDDEN = ("note", "notes", "source", "muscle")  # from tables on the screen; the JSON file has them
+_HIDDEN = ("note", "notes", "source", "muscle", "the bound is")  # from tables on the screen
+_DETAIL = ("Table 2", "Passive torques and ranges of motion", "Facts")  # only in the files
 
 
 @click.command()
@@ -30,6 +31,16 @@ _HIDDEN = ("note", "notes", "source", "muscle")  # from tables on the screen; th
     "--predict", multiple=True, type=click.Choice(["angle", "torque"]),
     help="What to compare with the data, once for all or once for each; by default torque where "
     "the joint is held still, angle elsewhere.",
+)  # fmt: skip
+@click.option(
+    "--fix", multiple=True, metavar="NAME=VALUE",
+    help="Keep a parameter at a value in a fit to the literature; hill_shape is that of every "
+    "muscle, elbow_flexor.hill_shape that of one.",
+)  # fmt: skip
+@click.option(
+    "--start", type=click.Choice(["relaxed", "held"]), default="relaxed", show_default=True,
+    help="How a joint starts a step of Table 2: both muscles relaxed, or held there by the "
+    "antagonist, which is then switched off.",
 )  # fmt: skip
 @click.option("--fit", "only", multiple=True, metavar="NAME", help="Fit only this parameter.")
 @click.option(
@@ -68,6 +79,8 @@ def identify(
     joints: tuple[str, ...],
     data: tuple[Path, ...],
     predict: tuple[str, ...],
+    fix: tuple[str, ...],
+    start: str,
     only: tuple[str, ...],
     torque: tuple[float, ...],
     decimal: tuple[str, ...],
@@ -79,8 +92,9 @@ def identify(
 ) -> None:
     """Fit the parameters of JOINTS within their bounds, and say how sure each is.
 
-    Without --data: to Table 2 of Winters & Stark (1987) and published passive torques and
-    ranges of motion, for all joints if none is named. With --data: to measurements of one joint,
+    Without --data: to Table 2 of Winters & Stark (1987), to published passive torques and ranges
+    of motion and to published facts, save those held out to test the fit; for all joints if none
+    is named. With --data: to measurements of one joint,
     CSV files with columns time [s], angle [deg], torque [N·m] and one of each muscle's name
     [0 to 1 or %]; units may be others, and without one they are s, rad, N·m and 0 to 1. Lines
     about the device may come first. The torque is all that acts on the joint from outside,
@@ -98,6 +112,9 @@ def identify(
             "--predict, --fit, --torque, --decimal, --hold, --join and --delay go with --data; the "
             "literature is fitted whole"
         )
+    if data and (fix or start != "relaxed"):
+        raise ValueError("--fix and --start are about the literature; leave them out with --data")
+    fixed = _fixed(fix)
     names = _known(joints, parameters)
     files = _files(names, output, measured=bool(data))
     if data:
@@ -110,8 +127,8 @@ def identify(
         }
         results = [_measured(names[0], data, files, only=only, parameters=parameters, **options)]
     else:
-        results = _from_literature(names, parameters)
-    what = "writing" if data else "measuring what the fit did not use"
+        results = _from_literature(names, parameters, fixed, start)
+    what = "writing" if data else "measuring the facts"
     with progress_bar(what) as progress:
         report = write(results, output, parameters=parameters, progress=progress)
     if as_json:
@@ -142,15 +159,35 @@ def _files(names: list[str], output: Path, *, measured: bool) -> dict[str, Path]
     return files
 
 
-def _from_literature(names: list[str], parameters: Path | None) -> list[Any]:
+def _fixed(options: tuple[str, ...]) -> dict[str, float]:
+    """Values by name, from options ``NAME=VALUE``."""
+    fixed = {}
+    for option in options:
+        name, _, value = option.partition("=")
+        try:
+            fixed[name] = float(value)
+        except ValueError:
+            raise ValueError(
+                f"--fix must be NAME=VALUE, such as velocity_activation=0, got {option!r}"
+            ) from None
+    return fixed
+
+
+def _from_literature(
+    names: list[str], parameters: Path | None, fixed: dict[str, float], start: str
+) -> list[Any]:
     from mjhill import identification
     from mjhill.identification.literature_fit import check_evidence
 
-    check_evidence(names, parameters)
+    check_evidence(names, parameters, fixed)
     results = []
     for index, name in enumerate(names):
         with progress_bar(f"fitting {name}, {index + 1} of {len(names)}") as progress:
-            results.append(identification.identify(name, parameters=parameters, progress=progress))
+            results.append(
+                identification.identify(
+                    name, parameters=parameters, fixed=fixed, start=start, progress=progress
+                )
+            )
     return results
 
 
@@ -172,7 +209,7 @@ def _measured(name: str, data: tuple[Path, ...], files: dict[str, Path], **optio
 def _print(report: dict[str, Any]) -> None:
     for title, rows in report.items():
         shown = [{k: v for k, v in row.items() if k not in _HIDDEN} for row in rows]
-        if shown:
+        if shown and title not in _DETAIL:
             print_table(shown, False, title=title)
     for row in report.get("Measurements", []):
         for note in row["notes"]:

@@ -24,7 +24,8 @@ STARTS = ("relaxed", "held")
 
 # standard deviations of what the fit compares; those of facts are published
 MAGNITUDE_SPREAD = 0.025  # of MAG
-DELAY_SPREAD = 0.1  # of T1 + T2
+DELAY_SPREAD = 0.08  # of T1 + T2
+FACT = 2.0  # weight of a fact, whose standard deviation is published
 _UNMEASURED = 5.0  # deviation of what cannot be measured
 _SHAPE_SAMPLES = 60
 _SETTLED = 5.0  # duration of a run, in units of the largest T1 + T2 ...
@@ -60,6 +61,25 @@ class Evidence:
         slowest = max((sum(row.time_constants) for _, row in self.steps), default=0.0)
         duration = max(_SHORTEST, _SETTLED * slowest)
         return np.asarray(np.arange(round(duration / _TIMESTEP) + 1) * _TIMESTEP)
+
+    @property
+    def labels(self) -> list[str]:
+        """What each residual is about, in the order of ``residuals``."""
+        steps = [f"{name} at {row.level:g}" for name, row in self.steps]
+        samples = len(self._shape_samples)
+        return [
+            *(torque.label for torque in self.torques),
+            *(end.label for end in self.ends),
+            *(f"MAG of {step}" for step in steps),
+            *(f"T1 + T2 of {step}" for step in steps),
+            *(f"shape of {step}" for step in steps for _ in range(samples)),
+            *(fact.quantity for fact in self.facts),
+        ]
+
+    @property
+    def _shape_samples(self) -> NDArray[np.intp]:
+        last = len(self.time) - 1
+        return np.unique(np.linspace(0, last, _SHAPE_SAMPLES).astype(np.intp))
 
     def responses(self, joints: list[Joint]) -> _Values:
         """Movement from the start in each step, for joints that differ in their parameters [rad].
@@ -113,7 +133,7 @@ class Evidence:
     def _step_residuals(self, responses: _Values) -> _Values:
         """Residuals of the steps' ends, delays and shapes, (K, steps, T) -> (K, R)."""
         time = self.time
-        pick = np.unique(np.linspace(0, len(time) - 1, _SHAPE_SAMPLES).astype(int))
+        pick = self._shape_samples
         magnitude = np.array([row.magnitude for _, row in self.steps])
         delay = np.array([sum(row.time_constants) for _, row in self.steps])
         wanted = np.array([step_response(time, *row.time_constants) for _, row in self.steps])
@@ -127,7 +147,7 @@ class Evidence:
             delay_error / (DELAY_SPREAD * delay),
             shape.reshape(len(responses), -1),
         ]
-        return np.nan_to_num(np.concatenate(parts, axis=1), nan=_UNMEASURED)
+        return np.asarray(np.nan_to_num(np.concatenate(parts, axis=1), nan=_UNMEASURED))
 
     def fits(self, joint: Joint) -> list[SecondOrderStep]:
         """Second-order fits of a joint's steps, in the order of ``steps``."""
@@ -142,7 +162,7 @@ def _fact_residuals(fact: Entry, joints: Sequence[Joint], memory: Memory | None)
         values = measure(fact, joints, memory)
     except UnmeasuredError:
         return np.full((len(joints), 1), _UNMEASURED)
-    return np.asarray(fact.deviation(values)[:, None])
+    return np.asarray(FACT * fact.deviation(values)[:, None])
 
 
 def evidence_on(

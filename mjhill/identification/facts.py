@@ -26,6 +26,7 @@ class Fact:
         measured: What the joint does; None where that cannot be measured.
         note: Why it could not, or how another reading of the same measurement comes out; often
             empty.
+        held_out: Whether no fit uses it.
     """
 
     joint: str
@@ -36,6 +37,14 @@ class Fact:
     source: str
     measured: float | None
     note: str = ""
+    held_out: bool = False
+
+    @property
+    def deviation(self) -> float | None:
+        """Standard deviations of the joint from the published mean, half of the interval each."""
+        if self.measured is None:
+            return None
+        return (2 * self.measured - self.low - self.high) / (self.high - self.low)
 
     @property
     def within(self) -> bool | None:
@@ -97,4 +106,5 @@ def _fact(entry: Entry, joint: Joint) -> Fact:
         entry.source,
         measured,
         note,
+        entry.held_out,
     )

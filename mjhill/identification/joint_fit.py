@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from mjhill.identification.failure import check_explained
@@ -27,12 +28,15 @@ def identify(
     parameters: str | Path | None = None,
     torque: float | Sequence[float] | None = None,
     decimal: str | Sequence[str] | None = None,
+    fixed: Mapping[str, float] = MappingProxyType({}),
+    start: str = "relaxed",
     progress: Callable[[float], None] | None = None,
 ) -> Identified:
     """Fit the parameters of a joint within their bounds, and say how sure each is.
 
-    Without measurements the fit is to Table 2 of Winters & Stark (1987) and to published passive
-    torques and ranges of motion. With measurements it is to these alone.
+    Without measurements the fit is to Table 2 of Winters & Stark (1987), to published passive
+    torques and ranges of motion, and to published facts that are not held out. With measurements
+    it is to these alone.
 
     Args:
         joint: The joint's name.
@@ -49,6 +53,10 @@ def identify(
             all or once for each.
         decimal: Sign between a number's digits in the files, ``.`` or ``,``, once for all or once
             for each; by default what the cells say.
+        fixed: Without measurements, parameters that are not fitted, and their values. A name such
+            as ``hill_shape`` is that of every muscle, ``elbow_flexor.hill_shape`` that of one.
+        start: Without measurements, how the joint starts a step of Table 2: ``relaxed``, or
+            ``held`` by the antagonist, which is then switched off.
         progress: Called with the share done, 0 to 1.
 
     Returns:
@@ -69,7 +77,9 @@ def identify(
             raise ValueError(
                 "predict, only, inputs, delay, torque and decimal need measurements; give them"
             )
-        return from_literature(joint, parameters, progress)
+        return from_literature(joint, parameters, progress, fixed=fixed, start=start)
+    if fixed or start != "relaxed":
+        raise ValueError("fixed and start are about the literature; leave them out")
     read = _read(measurements, known[joint], torque, decimal)
     result, predictions = from_measurements(
         joint,

@@ -14,11 +14,12 @@ from mjhill.identification.evidence import Evidence, evidence_on
 from mjhill.identification.fit import Identified, Residuals, Solution, intervals, solve
 from mjhill.identification.free import Free, free_parameters, joint_at, joint_with, pin
 from mjhill.identification.measures import Memory
+from mjhill.identification.pulls import held_back, pushed
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import read_joints
 from mjhill.literature.facts import Entry
 
-PRIOR = 0.5  # weight of the priors
+PRIOR = 0.6  # weight of the priors
 _LIGAMENTS = 1.0  # where k1 starts, in deviations: with none at all, a fit can miss them
 _DIFFERENCE, _TOLERANCE = 1e-2, 1e-4  # for derivatives, and of the fit [standard deviations]
 
@@ -57,7 +58,23 @@ def from_literature(
     """
     free, pinned = pin(free_parameters(joint, parameters), fixed)
     known = joint_with(read_joints(parameters)[joint], pinned)
-    evidence = _evidence(known, start, facts)
+    result = fit_evidence(_evidence(known, start, facts), free, progress)
+    return replace(result, pinned=tuple(pinned))
+
+
+def fit_evidence(
+    evidence: Evidence, free: Sequence[Free], progress: Callable[[float], None] | None = None
+) -> Identified:
+    """Fit parameters of a joint to what is published about it.
+
+    Args:
+        evidence: What is published, and the joint.
+        free: The parameters.
+        progress: Called with the share done, 0 to 1.
+
+    Raises:
+        RuntimeError: The fit did not settle.
+    """
     memory: Memory = {}
 
     def all_residuals(points: _Values) -> _Values:
@@ -82,12 +99,19 @@ def from_literature(
     first = fit(without_facts, _begin(free), lambda share: say(0.5 * share))
     solution = fit(all_residuals, first.deviations, lambda share: say(0.5 + 0.5 * share))
     ends = intervals(all_residuals, solution, len(free), PRIOR)
+    estimates = solution.estimates(free, ends, PRIOR)
+    labels = [*evidence.labels, *(f"bounds of {item.name}" for item in free)]
+    found, slopes = solution.residuals, solution.jacobian
+    at_bound = [index for index, one in enumerate(estimates) if one.at_bound]
+    for index in at_bound:
+        by = pushed(labels, found, slopes[:, index], solution.deviations[index] > 0)
+        estimates[index] = replace(estimates[index], pushed_by=by)
     return Identified(
-        joint_at(known, free, solution.deviations),
+        joint_at(evidence.joint, free, solution.deviations),
         tuple(free),
-        tuple(solution.estimates(free, ends, PRIOR)),
-        pinned=tuple(pinned),
-        start=start,
+        tuple(estimates),
+        start=evidence.start,
+        held_back=MappingProxyType(held_back(labels, found, slopes, at_bound)),
     )
 
 
@@ -96,15 +120,29 @@ def _begin(free: Sequence[Free]) -> _Values:
     return np.array([_LIGAMENTS if item.path[-1] in ("k1_pos", "k1_neg") else 0.0 for item in free])
 
 
-def check_evidence(joints: Iterable[str], parameters: str | Path | None = None) -> None:
+def check_evidence(
+    joints: Iterable[str],
+    parameters: str | Path | None = None,
+    fixed: Mapping[str, float] = MappingProxyType({}),
+) -> None:
     """Refuse joints without published data, before long work on others.
 
+    Args:
+        joints: Their names.
+        parameters: The parameter file; by default the one that comes with mjhill.
+        fixed: Parameters that are to be fixed, and their values.
+
     Raises:
-        ValueError: There is such a joint; the message names it.
+        ValueError: There is such a joint, or it does not have what is to be fixed; the message
+            names it.
     """
     known = read_joints(parameters)
     for name in joints:
         _evidence(known[name])
+        try:
+            pin(free_parameters(name, parameters), fixed)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
 
 
 def _evidence(

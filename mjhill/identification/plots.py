@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import degrees
 from pathlib import Path
 from typing import Any
@@ -19,21 +19,74 @@ from mjhill.joints.joint import Joint
 from mjhill.simulate.reference import plant_torque
 
 _DPI = 110
+_FACT = "#1f5fa8"
 
 
-def plot_literature(joint: Joint, path: str | Path) -> None:
+def plot_literature(joint: Joint, path: str | Path, start: str = "relaxed") -> None:
     """Draw a joint's steps beside Table 2, and its passive torque beside published ones.
+
+    Args:
+        joint: The joint.
+        path: The file.
+        start: How the joint starts a step, one of ``STARTS``.
 
     Raises:
         ValueError: The path does not end in .png.
         OSError: It cannot be written.
     """
-    evidence = evidence_on(joint)
+    evidence = evidence_on(joint, start=start)
     figure, panels = _figure(2 if evidence.steps else 1)
     if evidence.steps:
         _draw_steps(panels[0], evidence)
     _draw_passive(panels[-1], evidence)
     figure.suptitle(f"{joint.name}: identified, beside the literature")
+    _save(figure, path)
+
+
+def plot_facts(rows: Sequence[Mapping[str, Any]], path: str | Path) -> None:
+    """Draw how far each fact is from what was published, in standard deviations.
+
+    Args:
+        rows: Those of ``fact_rows``.
+        path: The file.
+
+    Raises:
+        ValueError: The path does not end in .png.
+        OSError: It cannot be written.
+    """
+    from matplotlib.figure import Figure
+
+    order = list(dict.fromkeys(row["joint"] for row in rows))
+    rows = sorted(rows, key=lambda row: order.index(row["joint"]))
+    figure = Figure(figsize=(9.5, 1.6 + 0.27 * len(rows)), dpi=_DPI, layout="constrained")
+    axes = figure.subplots()
+    for size, shade in ((2, "#eeeeee"), (1, "#d8d8d8")):
+        axes.axvspan(-size, size, color=shade, linewidth=0, zorder=0)
+    axes.axvline(0, color="grey", linewidth=0.8, zorder=1)
+    for use, face in (("fitted", _FACT), ("held out", "white")):
+        places = [
+            (row["deviation"], line)
+            for line, row in enumerate(rows)
+            if row["use"] == use and row["deviation"] is not None
+        ]
+        if places:
+            deviations, lines = zip(*places, strict=True)
+            axes.scatter(deviations, lines, s=38, color=face, edgecolors=_FACT, label=use, zorder=3)
+    for line, row in enumerate(rows):
+        ours = "not measured" if row["ours"] is None else f"{row['ours']:.3g}"
+        text = f"{ours} ({row['low']:.3g} to {row['high']:.3g}) {row['unit']}"
+        axes.text(1.02, line, text, transform=axes.get_yaxis_transform(), va="center", fontsize=8)
+        if line and row["joint"] != rows[line - 1]["joint"]:
+            axes.axhline(line - 0.5, color="grey", linewidth=0.5)
+    reach = max([2.0, *(abs(row["deviation"]) for row in rows if row["deviation"] is not None)])
+    axes.set_xlim(-1.15 * reach, 1.15 * reach)
+    names = [f"{row['joint']}: {row['quantity']}" for row in rows]
+    axes.set_yticks(range(len(rows)), names, fontsize=8)
+    axes.set_ylim(max(len(rows), 1) - 0.5, -0.5)
+    axes.set_xlabel("difference from the published mean [published standard deviations]")
+    axes.set_title("Published facts. Right: simulated (published mean ± SD)", fontsize=10)
+    if rows:
+        figure.legend(loc="outside lower left", fontsize="small", frameon=False, ncols=2)
     _save(figure, path)
 
 
@@ -69,7 +122,7 @@ def _draw_steps(axes: Any, evidence: Evidence) -> None:
         wanted = degrees(row.magnitude) * step_response(time, *row.time_constants)
         axes.plot(time, wanted, color=colour, linestyle="--", linewidth=1)
     axes.plot([], [], color="grey", linestyle="--", linewidth=1, label="Table 2")
-    axes.set(title="Steps of input", xlabel="time [s]", ylabel="way from the start [°]")
+    axes.set(title="Steps of excitation", xlabel="time [s]", ylabel="angle from the start [°]")
     axes.set_xlim(0, time[-1])
     axes.set_ylim(bottom=0)
     _finish(axes)
@@ -110,7 +163,7 @@ def _draw_prediction(axes: Any, prediction: Prediction) -> None:
         colour = MUSCLE_COLOURS[index % 2]
         inputs.fill_between(time, values, step="post", color=colour, alpha=0.25, linewidth=0)
         axes.fill_between([], [], color=colour, alpha=0.25, label=muscle)
-    inputs.set(ylim=(0, 4), yticks=[0, 1], ylabel="input [-]")
+    inputs.set(ylim=(0, 4), yticks=[0, 1], ylabel="excitation [-]")
     inputs.yaxis.set_label_coords(1.06, 0.125)
     _finish(axes)
 
