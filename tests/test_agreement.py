@@ -7,7 +7,6 @@ import pytest
 
 import mjhill
 from mjhill.identification.evidence import evidence_on
-
 from mjhill.identification.facts import facts
 from mjhill.identification.free import free_parameters
 from mjhill.identification.literature_fit import from_literature
