@@ -41,11 +41,18 @@ def sources(path):
     return elbow["damping"]["source"], extensor["excitation_tau"]["source"]
 
 
+def bounds():
+    """Those of the parameters, as text."""
+    return {one.name: f"{one.low:g} to {one.high:g}" for one in free_parameters("elbow")}
+
+
 def test_a_fitted_value_names_the_file_its_hash_and_where_its_bounds_come_from(file, written):
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     before, _ = sources(parameter_file())
     fitted, _ = sources(written)
-    assert fitted.startswith(f"fitted to trial.csv (SHA-256 {digest[:12]}) within 0.05 to 0.5: ")
+    assert fitted.startswith(
+        f"fitted to trial.csv (SHA-256 {digest[:12]}) within {bounds()['damping']}: "
+    )
     assert "% from the data, 95 % interval " in fitted
     assert fitted.endswith(f"; bounds: {before}")
     joint = read_joints(written)["elbow"]
@@ -56,10 +63,9 @@ def test_a_fitted_value_names_the_file_its_hash_and_where_its_bounds_come_from(f
 def test_a_value_that_the_data_do_not_inform_says_so(file, written):
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     _, untold = sources(written)
-    bounds = {one.name: f"{one.low:g} to {one.high:g}" for one in free_parameters("elbow")}
     assert untold.startswith(
         f"not informed by trial.csv (SHA-256 {digest[:12]}): 0 % from the data, so the value is "
-        f"that of the bounds {bounds[ONLY[1]]}; bounds: "
+        f"that of the bounds {bounds()[ONLY[1]]}; bounds: "
     )
 
 

@@ -1,7 +1,7 @@
-"""Published facts about human joints that no fit uses as data.
+"""Published facts about human joints.
 
 They are in ``facts.toml``, each with the measure that shows it and its source. The head of that
-file says which are not independent of the bounds that the fit was given.
+file says which are held out of the fit, by what rule, and what that is worth.
 """
 
 from __future__ import annotations
