@@ -27,12 +27,23 @@ def fits():
 
 def test_most_intervals_hold_the_truth(fits):
     (*_, row) = intervals.table(fits).rows
-    assert row["joint"] == "all"
+    assert row["joint"] == row["inputs"] == "all"
     assert row["fits"] == 6
     assert row["intervals"] == sum(len(one.truth) for one in fits)
     # of about 24; the whole study has the narrow goal
     assert row["hold the truth [%]"] >= 80
     assert row["from the data [%]"] > 30
+
+
+def test_the_table_has_every_joint_kind_and_rate(fits):
+    rows = {(row["joint"], row["inputs"]): row for row in intervals.table(fits).rows}
+    assert rows["elbow", "all"]["fits"] == rows["all", "pulses"]["fits"] == 2
+    assert rows["elbow", "chirps"]["fits"] == 1
+    assert rows["elbow", "chirps"]["at 200 Hz [%]"] == rows["elbow", "chirps"]["hold the truth [%]"]
+    assert rows["elbow", "chirps"]["at 100 Hz [%]"] is None
+    assert ("elbow", "steps") not in rows
+    assert [row["goal"] for row in rows.values()].count(None) == len(rows) - 1
+    assert rows["all", "all"]["goal"] == 92
 
 
 def test_inputs_are_taken_as_they_were_made(fits):

@@ -44,6 +44,7 @@ FEWEST, MOST = 3, 5  # fitted parameters
 HELD = 4  # one of so many joints is held still, and its torque predicted
 
 _CHUNK = 5
+_ALL = "all"
 _Values = NDArray[np.float64]
 Progress = Callable[[float], None]
 _Job = tuple[str, str, int, int]  # joint, kind, rate and number
@@ -72,6 +73,11 @@ class Fit:
         """Number of intervals that hold the truth."""
         pairs = zip(self.estimates, self.truth, strict=False)
         return sum(one.low <= value <= one.high for one, value in pairs)
+
+    def is_of(self, joint: str = _ALL, kind: str = _ALL, rate: str = _ALL) -> bool:
+        """Whether the fit is of a joint, a kind of inputs and a sampling rate; ``all`` is any."""
+        wanted = (joint, kind, rate)
+        return all(a in (_ALL, b) for a, b in zip(wanted, self.case.split(":"), strict=False))
 
 
 def measure(
@@ -230,43 +236,50 @@ def _signal(kind: str, rate: int, random: np.random.Generator) -> Callable[[_Val
 
 
 def table(fits: Sequence[Fit]) -> Result:
-    """A row for each joint, kind of inputs and rate, and one for all."""
-    cells: dict[tuple[str, str, str], list[Fit]] = {}
-    for one in fits:
-        name, kind, rate, _ = one.case.split(":")
-        cells.setdefault((name, kind, rate), []).append(one)
-    rows = [_row(*cell, group) for cell, group in cells.items()]
-    rows.append(_row("all", "", "", fits, GOAL))
+    """A row for each joint and kind of inputs, one for each of these alone, and one for all."""
+    rows = []
+    for name in (*NAMES, _ALL):
+        for kind in (*KINDS, _ALL):
+            group = [one for one in fits if one.is_of(joint=name, kind=kind)]
+            if group:
+                rows.append(_row(name, kind, group, GOAL if name == kind == _ALL else None))
     failed = [one.case for one in fits if not one.estimates]
     notes = (
         f"{DURATION:g} s each; noise, white: {np.degrees(ANGLE_NOISE):g}° and "
         f"{100 * TORQUE_NOISE:g} % of the strongest muscle; {FEWEST} to {MOST} parameters fitted, "
         f"the others known; one joint of {HELD} held still, its torque predicted",
-        "hold the truth: share of the intervals of 95 %; from the data: mean share of the prior's "
-        "variance that the data took away",
+        "hold the truth: share of the intervals of 95 %, also by sampling rate; from the data: "
+        "mean share of the prior's variance that the data took away",
         f"did not settle: {', '.join(failed) or 'none'}; one again: mjhill bench intervals --case "
         f"{fits[0].case}",
     )
     return Result(f"Intervals of fits, MuJoCo {mujoco.__version__}", rows, notes)
 
 
-def _row(
-    joint: str, kind: str, rate: str, fits: Sequence[Fit], goal: float | None = None
-) -> dict[str, Any]:
-    count = sum(len(one.truth) for one in fits)
-    held = 100 * sum(one.held for one in fits) / count
+def _row(joint: str, kind: str, fits: Sequence[Fit], goal: float | None) -> dict[str, Any]:
     told = [estimate.informed for one in fits for estimate in one.estimates]
+    held = _share_held(fits)
+    by_rate = {
+        f"at {rate} Hz [%]": _share_held([one for one in fits if one.is_of(rate=str(rate))])
+        for rate in RATES
+    }
     return {
         "joint": joint,
         "inputs": kind,
-        "rate [Hz]": rate,
         "fits": len(fits),
-        "intervals": count,
+        "intervals": sum(len(one.truth) for one in fits),
         "hold the truth [%]": held,
+        **by_rate,
         "from the data [%]": 100 * float(np.mean(told)) if told else None,
         "goal": goal,
-        "met": None if goal is None else held >= goal,
+        "met": None if goal is None or held is None else held >= goal,
     }
+
+
+def _share_held(fits: Sequence[Fit]) -> float | None:
+    """Share of the intervals that hold the truth [%]; None where there are none."""
+    count = sum(len(one.truth) for one in fits)
+    return 100 * sum(one.held for one in fits) / count if count else None
 
 
 def _job(case: str) -> _Job:

@@ -20,7 +20,9 @@ from mjhill.joints.reader import read_joints
 from mjhill.lab.rig import UnmeasuredError
 
 QUANTITIES = ("angle", "torque")  # what can be predicted
-DELAY = Free(("delay",), 0.0, 0.1)  # [s], bounds of that of a measured output
+# [s]; from EMG to torque it is 30 to 100 ms in all (Cavanagh & Komi 1979), of which the model has
+# a part
+DELAY = Free(("delay",), 0.0, 0.1)
 _FIRST_NOISE = 0.02  # of the spread of what is predicted, until the fit says better
 _ROUNDS = 4
 _DIFFERENCE = 1e-3  # standard deviations; shorter ones find the kinks of a simulation
