@@ -247,10 +247,9 @@ def parameter_text(results: Iterable[Identified], parameters: str | Path | None 
         for free, value in result.pinned:
             for path, here in free.values(value).items():
                 before = _entry(table, path)
-                entry = tomlkit.inline_table()
-                entry["value"] = here
-                entry["source"] = pinned_text(str(before["source"]), before["bounds"])
-                _entry(table, path[:-1])[path[-1]] = entry
+                source = tomlkit.string(pinned_text(str(before["source"]), before["bounds"]))
+                text = f"{path[-1]} = {{ value = {here!r}, source = {source.as_string()} }}"
+                _entry(table, path[:-1])[path[-1]] = tomlkit.parse(text)[path[-1]]
     return header(results, parameters) + tomlkit.dumps(document)
 
 
