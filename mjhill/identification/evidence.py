@@ -128,7 +128,7 @@ class Evidence:
             delay_error / (DELAY_SPREAD * delay),
             shape.reshape(len(responses), -1),
         ]
-        return np.nan_to_num(np.concatenate(parts, axis=1), nan=_UNMEASURED)
+        return np.asarray(np.nan_to_num(np.concatenate(parts, axis=1), nan=_UNMEASURED))
 
     def fits(self, joint: Joint) -> list[SecondOrderStep]:
         """Second-order fits of a joint's steps, in the order of ``steps``."""

@@ -68,8 +68,10 @@ def plot_facts(rows: Sequence[Mapping[str, Any]], path: str | Path) -> None:
             if row["use"] == use and row["deviation"] is not None
         ]
         if places:
+            deviations, lines = zip(*places, strict=True)
             axes.scatter(
-                *zip(*places, strict=True),
+                deviations,
+                lines,
                 s=38,
                 color=face,
                 edgecolors=_FACT,

@@ -102,7 +102,7 @@ def peaks(values: _Values) -> _Values:
     slope = 0.5 * (after - before)
     gain = np.divide(-0.5 * slope**2, bend, out=np.zeros_like(bend), where=bend < 0)
     inside = np.abs(slope) <= -bend
-    return np.where(inside, here + gain, values.max(axis=1))
+    return np.asarray(np.where(inside, here + gain, values.max(axis=1)))
 
 
 def _first_peak(values: _Values) -> tuple[_Values, NDArray[np.intp]]:
@@ -192,7 +192,7 @@ class _Movement:
         progress, _ = self.run(pulse, brake)
         top, where = _first_peak(progress)
         later = np.arange(progress.shape[1]) >= where[:, None]
-        back, _ = _first_peak(np.where(later, -progress, -top[:, None]))
+        back = peaks(np.where(later, -progress, -top[:, None]))
         return np.stack([top - 1.0, top + back - FALL_BACK])
 
     # --- one joint: a search from nothing
@@ -319,7 +319,7 @@ def ballistic_movements(
     movement = _Movement(joints, muscle, **options)
     pulses = movement.solve(guess)
     progress, velocity = movement.run(pulses.agonist, pulses.brake)
-    time = np.arange(movement.steps + 1) * movement.timestep
+    time = np.asarray(np.arange(movement.steps + 1) * movement.timestep, dtype=np.float64)
     return BallisticMovements(pulses, time, progress, velocity)
 
 
