@@ -235,7 +235,10 @@ def compare(
     type=click.IntRange(1),
     help="sweep: systems of each kind; fuzz, checks: models; endurance: steps.",
 )
-@click.option("--kind", multiple=True, help="sweep, fuzz: kind of model; several are possible.")
+@click.option(
+    "--kind", multiple=True,
+    help="sweep, fuzz: kind of model, several are possible; literature: variants or facts.",
+)  # fmt: skip
 @click.option("--case", metavar="KIND:NUMBER", help="sweep, fuzz, checks: run one model again.")
 @json_option
 def bench(
@@ -252,7 +255,8 @@ def bench(
 
     More benchmarks, one at a time, with their time on two cores: sweep, random systems against
     the reference solver (2 minutes); fuzz, 100,000 random models (5 minutes); checks, check_model
-    on sound and unsound models (3 minutes); endurance, 10⁸ steps (2 minutes).
+    on sound and unsound models (3 minutes); endurance, 10⁸ steps (2 minutes); literature, the
+    joints fitted in other ways (8 minutes).
     """
     from mjhill import benchmarks
 

@@ -17,7 +17,8 @@ from mjhill.cli.printing import (
 )
 from mjhill.files import check_writable
 
-_HIDDEN = ("note", "notes", "source", "muscle")  # from tables on the screen; the JSON file has them
+_HIDDEN = ("note", "notes", "source", "muscle", "the bound is")  # from tables on the screen
+_DETAIL = ("Table 2", "Passive torques and ranges of motion", "Facts")  # only in the files
 
 
 @click.command()
@@ -187,7 +188,7 @@ def _measured(name: str, data: tuple[Path, ...], files: dict[str, Path], **optio
 def _print(report: dict[str, Any]) -> None:
     for title, rows in report.items():
         shown = [{k: v for k, v in row.items() if k not in _HIDDEN} for row in rows]
-        if shown:
+        if shown and title not in _DETAIL:
             print_table(shown, False, title=title)
     for row in report.get("Measurements", []):
         for note in row["notes"]:

@@ -62,6 +62,25 @@ class Evidence:
         duration = max(_SHORTEST, _SETTLED * slowest)
         return np.asarray(np.arange(round(duration / _TIMESTEP) + 1) * _TIMESTEP)
 
+    @property
+    def labels(self) -> list[str]:
+        """What each residual is about, in the order of ``residuals``."""
+        steps = [f"{name} at {row.level:g}" for name, row in self.steps]
+        samples = len(self._shape_samples)
+        return [
+            *(torque.label for torque in self.torques),
+            *(end.label for end in self.ends),
+            *(f"MAG of {step}" for step in steps),
+            *(f"T1 + T2 of {step}" for step in steps),
+            *(f"shape of {step}" for step in steps for _ in range(samples)),
+            *(fact.quantity for fact in self.facts),
+        ]
+
+    @property
+    def _shape_samples(self) -> NDArray[np.intp]:
+        last = len(self.time) - 1
+        return np.unique(np.linspace(0, last, _SHAPE_SAMPLES).astype(np.intp))
+
     def responses(self, joints: list[Joint]) -> _Values:
         """Movement from the start in each step, for joints that differ in their parameters [rad].
 
@@ -114,7 +133,7 @@ class Evidence:
     def _step_residuals(self, responses: _Values) -> _Values:
         """Residuals of the steps' ends, delays and shapes, (K, steps, T) -> (K, R)."""
         time = self.time
-        pick = np.unique(np.linspace(0, len(time) - 1, _SHAPE_SAMPLES).astype(int))
+        pick = self._shape_samples
         magnitude = np.array([row.magnitude for _, row in self.steps])
         delay = np.array([sum(row.time_constants) for _, row in self.steps])
         wanted = np.array([step_response(time, *row.time_constants) for _, row in self.steps])

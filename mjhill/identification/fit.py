@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import mujoco.minimize
@@ -38,6 +38,7 @@ class Estimate:
             the interval: near 0 the value is the prior's, near 1 the data's. The variance of a
             prior of weight w is that of the bounds over w².
         at_bound: Whether it ended on a bound.
+        pushed_by: What would be met better beyond that bound; empty where that was not looked for.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Estimate:
     bounds: tuple[float, float]
     informed: float
     at_bound: bool
+    pushed_by: str = ""
 
 
 @dataclass(frozen=True)
@@ -58,12 +60,14 @@ class Solution:
         covariance: Of the deviations, shape (P, P); linear about the solution.
         jacobian: Slopes of the residuals, then of the priors, shape (R + P, P).
         cost: Half the sum of squares, priors included.
+        residuals: Residuals, then those of the priors, shape (R + P,).
     """
 
     deviations: NDArray[np.float64]
     covariance: NDArray[np.float64]
     jacobian: NDArray[np.float64]
     cost: float
+    residuals: NDArray[np.float64]
 
     @property
     def ends(self) -> NDArray[np.float64]:
@@ -161,7 +165,8 @@ def solve(
         all_residuals, point, found, np.float64(difference), 0, [b.reshape(-1, 1) for b in bounds]
     )
     covariance = np.linalg.inv(jacobian.T @ jacobian)
-    return Solution(point[:, 0], covariance, jacobian, 0.5 * float((found**2).sum()))
+    cost = 0.5 * float((found**2).sum())
+    return Solution(point[:, 0], covariance, jacobian, cost, found[:, 0])
 
 
 _RISE = 0.5 * CONFIDENT**2  # of the cost, at the end of an interval
@@ -311,6 +316,7 @@ class Identified:
             a fit to the literature.
         pinned: Parameters that were fixed, and their values.
         start: How the joint started a step of Table 2, ``relaxed`` or ``held``.
+        held_back: For each piece of published evidence, what gets worse where it is met better.
     """
 
     joint: Joint
@@ -319,6 +325,7 @@ class Identified:
     predictions: tuple[Any, ...] = ()
     pinned: tuple[tuple[Free, float], ...] = ()
     start: str = "relaxed"
+    held_back: Mapping[str, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
         """A line for each parameter: value, interval of 95 % confidence, share from the data.

@@ -79,7 +79,7 @@ def free_parameters(joint: str, path: str | Path | None = None) -> list[Free]:
     known = read_joints(path)
     if joint not in known:
         raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(known)}")
-    tables = tomllib.loads(Path(path or parameter_file()).read_text(encoding="utf-8"))
+    tables = tomllib.loads(parameter_file(path).read_text(encoding="utf-8"))
     found = list(_entries(tables[joint], ()))
     if tables[joint].get("symmetric"):
         found = list(_tied(found, list(known[joint].muscles)))

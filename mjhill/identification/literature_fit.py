@@ -14,6 +14,7 @@ from mjhill.identification.evidence import Evidence, evidence_on
 from mjhill.identification.fit import Identified, Residuals, Solution, intervals, solve
 from mjhill.identification.free import Free, free_parameters, joint_at, joint_with, pin
 from mjhill.identification.measures import Memory
+from mjhill.identification.pulls import held_back, pushed
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import read_joints
 from mjhill.literature.facts import Entry
@@ -57,7 +58,23 @@ def from_literature(
     """
     free, pinned = pin(free_parameters(joint, parameters), fixed)
     known = joint_with(read_joints(parameters)[joint], pinned)
-    evidence = _evidence(known, start, facts)
+    result = fit_evidence(_evidence(known, start, facts), free, progress)
+    return replace(result, pinned=tuple(pinned))
+
+
+def fit_evidence(
+    evidence: Evidence, free: Sequence[Free], progress: Callable[[float], None] | None = None
+) -> Identified:
+    """Fit parameters of a joint to what is published about it.
+
+    Args:
+        evidence: What is published, and the joint.
+        free: The parameters.
+        progress: Called with the share done, 0 to 1.
+
+    Raises:
+        RuntimeError: The fit did not settle.
+    """
     memory: Memory = {}
 
     def all_residuals(points: _Values) -> _Values:
@@ -82,12 +99,19 @@ def from_literature(
     first = fit(without_facts, _begin(free), lambda share: say(0.5 * share))
     solution = fit(all_residuals, first.deviations, lambda share: say(0.5 + 0.5 * share))
     ends = intervals(all_residuals, solution, len(free), PRIOR)
+    estimates = solution.estimates(free, ends, PRIOR)
+    labels = [*evidence.labels, *(f"bounds of {item.name}" for item in free)]
+    found, slopes = solution.residuals, solution.jacobian
+    at_bound = [index for index, one in enumerate(estimates) if one.at_bound]
+    for index in at_bound:
+        by = pushed(labels, found, slopes[:, index], solution.deviations[index] > 0)
+        estimates[index] = replace(estimates[index], pushed_by=by)
     return Identified(
-        joint_at(known, free, solution.deviations),
+        joint_at(evidence.joint, free, solution.deviations),
         tuple(free),
-        tuple(solution.estimates(free, ends, PRIOR)),
-        pinned=tuple(pinned),
-        start=start,
+        tuple(estimates),
+        start=evidence.start,
+        held_back=MappingProxyType(held_back(labels, found, slopes, at_bound)),
     )
 
 

@@ -47,7 +47,7 @@ def plot_facts(rows: Sequence[Mapping[str, Any]], path: str | Path) -> None:
     """Draw how far each fact is from what was published, in standard deviations.
 
     Args:
-        rows: Those of ``fact_rows``, one or more.
+        rows: Those of ``fact_rows``.
         path: The file.
 
     Raises:
@@ -56,12 +56,14 @@ def plot_facts(rows: Sequence[Mapping[str, Any]], path: str | Path) -> None:
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9.5, 1.4 + 0.27 * len(rows)), dpi=_DPI, layout="constrained")
+    order = list(dict.fromkeys(row["joint"] for row in rows))
+    rows = sorted(rows, key=lambda row: order.index(row["joint"]))
+    figure = Figure(figsize=(9.5, 1.6 + 0.27 * len(rows)), dpi=_DPI, layout="constrained")
     axes = figure.subplots()
     for size, shade in ((2, "#eeeeee"), (1, "#d8d8d8")):
         axes.axvspan(-size, size, color=shade, linewidth=0, zorder=0)
     axes.axvline(0, color="grey", linewidth=0.8, zorder=1)
-    for label, use, face in (("fitted", "fitted", _FACT), ("held out", "held out", "white")):
+    for use, face in (("fitted", _FACT), ("held out", "white")):
         places = [
             (row["deviation"], line)
             for line, row in enumerate(rows)
@@ -69,29 +71,22 @@ def plot_facts(rows: Sequence[Mapping[str, Any]], path: str | Path) -> None:
         ]
         if places:
             deviations, lines = zip(*places, strict=True)
-            axes.scatter(
-                deviations,
-                lines,
-                s=38,
-                color=face,
-                edgecolors=_FACT,
-                label=label,
-                zorder=3,
-            )
-    reach = max([2.0, *(abs(row["deviation"]) for row in rows if row["deviation"] is not None)])
-    axes.set_xlim(-1.15 * reach, 1.15 * reach)
+            axes.scatter(deviations, lines, s=38, color=face, edgecolors=_FACT, label=use, zorder=3)
     for line, row in enumerate(rows):
         ours = "not measured" if row["ours"] is None else f"{row['ours']:.3g}"
         text = f"{ours} ({row['low']:.3g} to {row['high']:.3g}) {row['unit']}"
         axes.text(1.02, line, text, transform=axes.get_yaxis_transform(), va="center", fontsize=8)
         if line and row["joint"] != rows[line - 1]["joint"]:
             axes.axhline(line - 0.5, color="grey", linewidth=0.5)
+    reach = max([2.0, *(abs(row["deviation"]) for row in rows if row["deviation"] is not None)])
+    axes.set_xlim(-1.15 * reach, 1.15 * reach)
     names = [f"{row['joint']}: {row['quantity']}" for row in rows]
     axes.set_yticks(range(len(rows)), names, fontsize=8)
-    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.set_ylim(max(len(rows), 1) - 0.5, -0.5)
     axes.set_xlabel("difference from the published mean [published standard deviations]")
-    axes.set_title("Published facts; to the right: simulated (published interval)", fontsize=10)
-    axes.legend(loc="lower left", bbox_to_anchor=(-0.75, -0.02), fontsize="small", frameon=False)
+    axes.set_title("Published facts. Right: simulated (published mean ± SD)", fontsize=10)
+    if rows:
+        figure.legend(loc="outside lower left", fontsize="small", frameon=False, ncols=2)
     _save(figure, path)
 
 

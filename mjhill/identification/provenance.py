@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mjhill.identification.fit import Estimate, Identified
 from mjhill.identification.measurement import Measurement
-from mjhill.joints.reader import FITTED
+from mjhill.joints.reader import FITTED, parameter_file
 
 INFORMED = 0.1  # share from the data below which a value is said to be that of its bounds
 _BOUNDS = "; bounds: "  # before what the file said of a parameter: where its bounds come from
@@ -58,15 +58,19 @@ def pinned_text(before: str, bounds: Sequence[float]) -> str:
 
 
 def header(results: Sequence[Identified], parameters: str | Path | None) -> str:
-    """Comment lines about all fits to measurements of a parameter file; none without such fits.
+    """Comment lines about what was fixed and about fits to measurements; often none.
 
     Args:
         results: The fits.
         parameters: The file that they started from; None for the one that comes with mjhill.
     """
     measured = [result for result in results if result.predictions]
+    pinned = {item.path[-1]: value for result in results for item, value in result.pinned}
     if not measured:
-        return ""
+        if not pinned:
+            return ""
+        listed = ", ".join(f"{name} = {value:g}" for name, value in pinned.items())
+        return f"# Made by mjhill identify with --fix: {listed}.\n\n"
     lines = []
     for result in measured:
         lines.append(
@@ -91,8 +95,8 @@ def header(results: Sequence[Identified], parameters: str | Path | None) -> str:
             )
     start = "joints.toml, which comes with mjhill"
     if parameters:
-        digest = hashlib.sha256(Path(parameters).read_bytes()).hexdigest()
-        start = f"{Path(parameters).name}, SHA-256 {digest}"
+        file = parameter_file(parameters)
+        start = f"{file.name}, SHA-256 {hashlib.sha256(file.read_bytes()).hexdigest()}"
     lines.append(f"All else, with the comments that follow, is that of {start}.")
     return "".join(f"# {_printable(line)}\n" for line in lines) + "\n"
 

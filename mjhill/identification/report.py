@@ -8,11 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from mjhill.files import check_writable, replacing
+from mjhill.identification.evidence import DELAY_SPREAD, FACT, MAGNITUDE_SPREAD
 from mjhill.identification.facts import facts
 from mjhill.identification.fit import Identified
+from mjhill.identification.literature_fit import PRIOR
 from mjhill.identification.plots import plot_facts, plot_literature, plot_predictions
 from mjhill.identification.provenance import header, pinned_text, source_text
 from mjhill.identification.rows import (
+    DELAY_MET,
+    DEVIATION_MET,
+    MAGNITUDE_MET,
+    agreement_rows,
+    bound_rows,
     estimate_rows,
     fact_counts,
     fact_rows,
@@ -22,6 +29,7 @@ from mjhill.identification.rows import (
 )
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import parameter_file, read_joints
+from mjhill.literature.table2 import SHAPE_SPREAD
 
 _DIGITS = 4  # significant, of fitted values in a parameter file
 
@@ -57,7 +65,7 @@ def write(
     """Write fitted joints: parameter file, tables (JSON), a page (Markdown) and plots (PNG).
 
     A fit to the literature is reported with its agreement with Table 2, with published torques
-    and ranges, and with facts that no fit used. These are computed from the parameter file as
+    and ranges, and with facts, fitted and held out. These are computed from the parameter file as
     written, with its four digits. A fit to measurements is reported with its predictions. Each
     file appears whole or not at all; for their names see ``output_files``.
 
@@ -88,11 +96,11 @@ def write(
     fitted = {
         name: written[name] for name, one in zip(names, results, strict=True) if not one.predictions
     }
-    starts = {one.joint.name: one.start for one in results}
-    report = _literature_tables(fitted, starts, progress) if fitted else {}
-    for name, joint in fitted.items():
-        plot_literature(joint, files[name], starts[name])
-    if report.get("Facts"):
+    literature = [one for one in results if not one.predictions]
+    report = _literature_tables(literature, fitted, progress) if fitted else {}
+    for one in literature:
+        plot_literature(fitted[one.joint.name], files[one.joint.name], one.start)
+    if fitted:
         plot_facts(report["Facts"], files["facts"])
     for result in measured:
         plot_predictions(result.joint.name, result.predictions, files[result.joint.name])
@@ -105,21 +113,29 @@ def write(
 
 
 def _literature_tables(
+    results: Sequence[Identified],
     joints: Mapping[str, Joint],
-    starts: Mapping[str, str],
     progress: Callable[[float], None] | None,
 ) -> dict[str, list[dict[str, Any]]]:
     measured = facts(joints, progress)
     return {
-        "Table 2": [
-            row for name, joint in joints.items() for row in step_rows(joint, starts[name])
-        ],
+        "Facts counted": fact_counts(measured),
+        **{
+            agreement_title(one.joint.name): agreement_rows(one, joints[one.joint.name], measured)
+            for one in results
+        },
+        "Parameters on a bound": [row for one in results for row in bound_rows(one)],
+        "Table 2": [row for one in results for row in step_rows(joints[one.joint.name], one.start)],
         "Passive torques and ranges of motion": [
             row for joint in joints.values() for row in published_rows(joint)
         ],
         "Facts": fact_rows(measured),
-        "Facts counted": fact_counts(measured) if measured else [],
     }
+
+
+def agreement_title(joint: str) -> str:
+    """The title of the table of ``agreement_rows``."""
+    return f"Joint {joint}"
 
 
 def _write_text(path: Path, text: str) -> None:
@@ -131,7 +147,9 @@ def markdown(report: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
     """The tables of a report as a page."""
     parts = [_PREFACE]
     for title, rows in report.items():
-        parts.append(f"## {title}\n\n{_EXPLANATIONS.get(title, '')}\n\n{_markdown_table(rows)}\n")
+        if rows:
+            about = f"{_EXPLANATIONS[title]}\n\n" if title in _EXPLANATIONS else ""
+            parts.append(f"## {title}\n\n{about}{_markdown_table(rows)}\n")
     return "\n".join(parts)
 
 
@@ -152,33 +170,54 @@ def _cell(value: Any) -> str:
     return text.replace("|", "\\|").replace("<", "&lt;").replace("](", "]\\(")
 
 
-_PREFACE = """# Joints beside the literature
+_PREFACE = f"""# Joints beside the literature
 
-Written by `mjhill identify`, which fits the parameters that have bounds in
-`mjhill/joints/joints.toml` to Table 2 of Winters & Stark (1987) and to published passive torques
-and ranges of motion (`table2.csv` and `published.csv` in `mjhill/literature`). The bounds are what
-measurements on
-relaxed joints and muscle geometry allow; nothing leaves them. Each fit has a prior, the middle of
-the bounds, so it has one answer and says how much of it came from the data. `mjhill info NAME`
-gives every source.
+Written by `mjhill identify`. It fits the parameters that have bounds in a parameter file to four
+kinds of published data:
+
+| data | one standard deviation in the fit |
+|---|---|
+| Table 2 of Winters & Stark (1987): MAG | {100 * MAGNITUDE_SPREAD:g} % |
+| its T1 + T2 | {100 * DELAY_SPREAD:g} % |
+| its shape of the response | {100 * SHAPE_SPREAD:g} % of MAG |
+| passive torques and ranges of motion (`published.csv`) | a quarter of the published interval |
+| facts that are not held out (`facts.toml`) | half of the published interval, over {FACT:g} |
+| priors: the middle of the bounds | half of the way to a bound, over {PRIOR:g} |
+
+Nothing leaves the bounds, which come from other measurements. The files are in
+`mjhill/literature`. A **held-out** fact is not used by the fit: it tests the result on data that
+could not influence the parameters. Bounds and weights were chosen by people who had seen all
+facts. Every third fact of a joint is held out, and all of the knee; the head of `facts.toml`
+states the rule.
+
+In the tables of the joints, `met` means: MAG within {MAGNITUDE_MET:g} % of Table 2, T1 + T2
+within {DELAY_MET:g} %, all else within {DEVIATION_MET:g} standard deviations (SD). An interval of
+a fact is 2 SD wide, one of a passive torque or a range of motion 4 SD. `against` says why
+something is not met, or is more than 1 SD off: it names what gets worse where that is met better.
+`bounds of` a parameter is the prior that keeps it near the middle of its bounds.
 """
 
 _EXPLANATIONS = {
-    "Table 2": """A step of input to one muscle, the other at rest, from a posture that Table 2
-does not state and the fit finds. MAG, T1 and T2 are those of the overdamped second-order response
-nearest to the simulated one. T1 and T2 singly say little where they are nearly equal or the
-response swings, marked ill-conditioned: their sum is what counts. Published T1 and T2 are
-corrected where the note says so; a row without a direction holds for both.""",
-    "Passive torques and ranges of motion": """Low and high span what is published, the fit's data
-beside Table 2. Where the two contradict each other, as where Table 2 wants a joint to go further
-than its range, the fit is in between and `outside by` says by how much it misses.""",
-    "Not used by the fit": """Published facts measured in simulation. Most of what is off has one of
-two causes. Table 2 wants slow joints: at 50 % input its time constants leave no room for the
-largest velocities that others report. And the input of a twitch or a small saccade is one short
-pulse of at most 1, through the time constants of eq. 12.""",
-    "Parameters": """SI units. The interval holds the value with 95 % confidence, given the bounds,
-the data and their stated errors, and that the model is right; `from the data` is the share of the
-prior's variance that the data took away, by the width of the interval.""",
+    "Facts counted": """How many facts lie within one and two published standard deviations.
+
+![Facts in published standard deviations from the published mean](facts.png)""",
+    "Parameters on a bound": """They would leave physiology if they could. `better beyond it` says
+what would then be met better: where that is a row of Table 2, the paper and the source of the
+bound contradict each other.""",
+    "Table 2": """A step of excitation to one muscle from a posture that Table 2 does not state
+and the fit finds. The other muscle is at rest (`--start held`: it holds the start, and is then
+switched off). `recoil` is the part of MAG that passive elasticity alone gives: the way from the
+start to rest. MAG, T1 and T2 are those of the overdamped second-order response nearest to the
+simulated one. T1 and T2 singly say little where they are nearly equal or the response swings,
+marked ill-conditioned: their sum is what counts. Published T1 and T2 are corrected where the note
+says so; a row without a direction holds for both.""",
+    "Passive torques and ranges of motion": """Low and high span what is published, 4 standard
+deviations.""",
+    "Facts": """Low and high are the published mean less and plus one standard deviation, or what
+the sources span.""",
+    "Parameters": """SI units. The interval holds the value with 95 % confidence, given the
+bounds, the data and their stated errors, and that the model is right; `from the data` is the
+share of the prior's variance that the data took away, by the width of the interval.""",
 }
 
 
@@ -195,7 +234,7 @@ def parameter_text(results: Iterable[Identified], parameters: str | Path | None 
     import tomlkit
 
     results = list(results)
-    document = tomlkit.parse(Path(parameters or parameter_file()).read_text(encoding="utf-8"))
+    document = tomlkit.parse(parameter_file(parameters).read_text(encoding="utf-8"))
     for result in results:
         table = document[result.joint.name]
         for free, estimate in zip(result.free, result.estimates, strict=True):
@@ -207,9 +246,10 @@ def parameter_text(results: Iterable[Identified], parameters: str | Path | None 
                     entry["source"] = source_text(result, estimate, str(entry["source"]))
         for free, value in result.pinned:
             for path, here in free.values(value).items():
-                entry = _entry(table, path)
-                entry["value"] = here
-                entry["source"] = pinned_text(str(entry["source"]), entry.pop("bounds"))
+                before = _entry(table, path)
+                source = tomlkit.string(pinned_text(str(before["source"]), before["bounds"]))
+                text = f"{path[-1]} = {{ value = {here!r}, source = {source.as_string()} }}"
+                _entry(table, path[:-1])[path[-1]] = tomlkit.parse(text)[path[-1]]
     return header(results, parameters) + tomlkit.dumps(document)
 
 

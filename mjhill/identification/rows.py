@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import degrees
 from typing import Any
 
 from mjhill.identification.evidence import Evidence, evidence_on
 from mjhill.identification.facts import Fact
 from mjhill.identification.fit import Identified
+from mjhill.identification.free import Free
 from mjhill.identification.movement import Prediction
 from mjhill.joints.joint import Joint
+from mjhill.literature.published import EndAngle, PassiveTorque
+
+MAGNITUDE_MET, DELAY_MET = 5.0, 15.0
+"""Largest difference of MAG and of T1 + T2 from Table 2 that counts as met [%]."""
+DEVIATION_MET = 2.0
+"""Largest difference from anything else that counts as met [standard deviations]."""
 
 _NEAR = 1.3  # ratio of T1 to T2 below which only their sum is well determined
 
@@ -64,7 +71,7 @@ def _published_rows(evidence: Evidence) -> Iterator[dict[str, Any]]:
     for torque in evidence.torques:
         yield _published_row(
             joint,
-            f"passive torque at {degrees(torque.angle):.0f}° [N·m]",
+            torque.label,
             (torque.low, torque.high),
             torque.measured(joint),
             torque.source,
@@ -72,7 +79,7 @@ def _published_rows(evidence: Evidence) -> Iterator[dict[str, Any]]:
     for end in evidence.ends:
         yield _published_row(
             joint,
-            f"full effort of {end.muscle} ends at [°]",
+            end.label,
             (degrees(end.low), degrees(end.high)),
             degrees(end.measured(joint)),
             end.source,
@@ -93,6 +100,113 @@ def _published_row(
         "outside by": outside or None,
         "source": source,
     }
+
+
+def agreement_rows(result: Identified, joint: Joint, facts: Sequence[Fact]) -> list[dict[str, Any]]:
+    """What of the literature a fitted joint meets and what it does not, one row each.
+
+    Met is MAG within 5 %, T1 + T2 within 15 %, and all else within two standard deviations.
+    ``against`` says what gets worse where a piece of evidence that the fit used is met better;
+    it is given for what is not met or more than one standard deviation off.
+
+    Args:
+        result: The fit.
+        joint: The fitted joint, with the digits that are written.
+        facts: Facts as measured; those about other joints are ignored.
+    """
+    rows = []
+    for row in step_rows(joint, result.start):
+        step = f"{row['muscle']} at {row['excitation']:g}"
+        times = [row["T1 [ms]"] + row["T2 [ms]"], row["our T1 [ms]"] + row["our T2 [ms]"]]
+        for name, unit, pair, off, most in (
+            ("MAG", "°", (row["MAG [°]"], row["ours [°]"]), row["off [%]"], MAGNITUDE_MET),
+            ("T1 + T2", "ms", times, row["T1 + T2 off [%]"], DELAY_MET),
+        ):
+            label = f"{name} of {step}"
+            against = result.held_back.get(label, "") if abs(off) > most else ""
+            wanted, ours = (f"{value:.3g}" for value in pair)
+            rows.append(_agreement(f"{label} [{unit}]", wanted, ours, f"{off:+.1f} %",
+                                   abs(off) <= most, against))  # fmt: skip
+    evidence = evidence_on(joint, start=result.start)
+    published: list[PassiveTorque | EndAngle] = [*evidence.torques, *evidence.ends]
+    spread = [(one.label, one.deviation(joint)) for one in published]
+    for row, (label, off) in zip(published_rows(joint), spread, strict=True):
+        rows.append(_spread_agreement(result, label, label, row["low"], row["high"], row["ours"],
+                                      off, ""))  # fmt: skip
+    for fact in facts:
+        if fact.joint == joint.name:
+            rows.append(_spread_agreement(
+                result, fact.quantity, f"{fact.quantity} [{fact.unit}]", fact.low, fact.high,
+                fact.measured, fact.deviation, "held out" if fact.held_out else "",
+            ))  # fmt: skip
+    return rows
+
+
+def _spread_agreement(
+    result: Identified,
+    label: str,
+    quantity: str,
+    low: float,
+    high: float,
+    ours: float | None,
+    off: float | None,
+    use: str,
+) -> dict[str, Any]:
+    published = f"{low:.3g} to {high:.3g}"
+    if ours is None or off is None:
+        return _agreement(quantity, published, "not measured", "", False, use)
+    against = result.held_back.get(label, "") if abs(off) > 1 else ""
+    return _agreement(
+        quantity,
+        published,
+        f"{ours:.3g}",
+        f"{off:+.2f} SD",
+        abs(off) <= DEVIATION_MET,
+        use or against,
+    )
+
+
+def _agreement(
+    quantity: str, published: str, ours: str, off: str, met: bool, against: str
+) -> dict[str, Any]:
+    return {
+        "quantity": quantity,
+        "published": published,
+        "ours": ours,
+        "off": off,
+        "met": "yes" if met else "no",
+        "against": against,
+    }
+
+
+def bound_rows(result: Identified) -> list[dict[str, Any]]:
+    """The parameters that ended on a bound: where it comes from, and what pushes there."""
+    rows = []
+    for free, item in zip(result.free, result.estimates, strict=True):
+        if item.at_bound:
+            upper = abs(item.value - item.bounds[1]) < abs(item.value - item.bounds[0])
+            rows.append(
+                {
+                    "joint": result.joint.name,
+                    "parameter": item.name,
+                    "bound": item.bounds[1] if upper else item.bounds[0],
+                    "side": "upper" if upper else "lower",
+                    "better beyond it": item.pushed_by,
+                    "the bound is": _source(result.joint, free),
+                }
+            )
+    return rows
+
+
+def _source(joint: Joint, free: Free) -> str:
+    """What the parameter file says of a parameter."""
+    *path, name = free.path
+    node: Any = joint
+    for key in path:
+        if key == "postures":
+            return joint.sources[f"postures.{name}"]
+        node = node[key] if isinstance(node, Mapping) else getattr(node, key)
+    return str(node.sources[name]).partition(": ")[2]
 
 
 def estimate_rows(result: Identified) -> list[dict[str, Any]]:

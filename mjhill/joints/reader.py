@@ -17,7 +17,9 @@ from mjhill.joints.joint import Joint, Passive
 from mjhill.muscles import Muscle, muscle_model
 from mjhill.quantity import flags, quantities
 
-_DATA = Path(__file__).parent / "joints.toml"
+SETS = ("joints", "constant_velocity")
+"""Sets of parameters that come with mjhill; in the second, V_max does not rise with activation."""
+
 _Made = TypeVar("_Made", Joint, Muscle, Passive)
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,63}")  # becomes a file's name
 _ENTRY = ("value", "source", "bounds")
@@ -28,13 +30,23 @@ _GEARS = (1e-6, 1e6)  # size of a gear
 _TEXT = 200  # characters of what is no source
 
 
-def parameter_file() -> Path:
-    """The file that holds the parameters of the joints that come with mjhill."""
-    return _DATA
+def parameter_file(path: str | Path | None = None) -> Path:
+    """A file of parameters.
+
+    Args:
+        path: The name of a set that comes with mjhill, one of ``SETS``, or a path, which is given
+            back; by default that of the first set.
+    """
+    if path is None or str(path) in SETS:
+        return Path(__file__).parent / f"{path or SETS[0]}.toml"
+    return Path(path)
 
 
 def read_joints(path: str | Path | None = None) -> dict[str, Joint]:
     """The joints of a parameter file in the form of ``joints.toml``, which is the default.
+
+    ``constant_velocity`` is the other set that comes with mjhill: its V_max does not rise with
+    activation, as in the paper.
 
     Every value stands as ``name = { value = ..., source = "..." }``, with ``bounds`` where
     ``mjhill identify`` may fit it. A joint with ``symmetric = true`` is fitted with both muscles
@@ -45,7 +57,7 @@ def read_joints(path: str | Path | None = None) -> dict[str, Joint]:
             of bounds; the message names the file, the table and the entry.
         OSError: There is no such file, or it cannot be read.
     """
-    file = Path(path or _DATA)
+    file = parameter_file(path)
     try:
         tables = tomllib.loads(_text(file))
     except ValueError as error:

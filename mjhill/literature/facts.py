@@ -1,7 +1,7 @@
-"""Published facts about human joints: fits use most of them, and some are held out to test fits.
+"""Published facts about human joints.
 
 They are in ``facts.toml``, each with the measure that shows it and its source. The head of that
-file says by which rule facts are held out.
+file says which are held out of the fit, by what rule, and what that is worth.
 """
 
 from __future__ import annotations

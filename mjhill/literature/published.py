@@ -34,6 +34,11 @@ class PassiveTorque:
     high: float
     source: str
 
+    @property
+    def label(self) -> str:
+        """What it is, with its unit."""
+        return f"passive torque at {degrees(self.angle):.0f}° [N·m]"
+
     def measured(self, joint: Joint) -> float:
         """The restoring torque of a joint's passive elasticity there [N·m]."""
         torque = plant_torque(joint, self.angle)
@@ -72,6 +77,11 @@ class EndAngle:
     low: float
     high: float
     source: str
+
+    @property
+    def label(self) -> str:
+        """What it is, with the unit of tables."""
+        return f"full effort of {self.muscle} ends at [°]"
 
     def measured(self, joint: Joint) -> float:
         """Angle [rad] at which a joint is in balance under the full effort of the muscle.
