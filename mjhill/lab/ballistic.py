@@ -56,7 +56,7 @@ class Pulses:
 
 @dataclass(frozen=True)
 class BallisticMovements:
-    """Movements of N joints that go their amplitude and no farther.
+    """Movements of N joints that stop at their amplitude and then stay near it.
 
     Attributes:
         pulses: Widths of their pulses.
@@ -296,7 +296,7 @@ def ballistic_movements(
 
     Without a brake, the pulse is just wide enough to reach the new angle and not pass it. With a
     brake, the pulse is the widest for which the brake stops the joint at the new angle and the
-    joint then comes back by no more than 5 %.
+    joint then comes back by no more than 5 %. In both, it never passes that angle by more than 5 %.
 
     Args:
         joints: N joints with the same muscles and gears; other numbers may differ.
@@ -319,6 +319,10 @@ def ballistic_movements(
     movement = _Movement(joints, muscle, **options)
     pulses = movement.solve(guess)
     progress, velocity = movement.run(pulses.agonist, pulses.brake)
+    if progress.max() > 1.0 + FALL_BACK:
+        raise UnmeasuredError(
+            f"it stops at its new angle and then passes it by {progress.max() - 1.0:.0%}"
+        )
     time = np.asarray(np.arange(movement.steps + 1) * movement.timestep, dtype=np.float64)
     return BallisticMovements(pulses, time, progress, velocity)
 

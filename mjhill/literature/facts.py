@@ -88,14 +88,16 @@ def read_entries(path: str | Path = _DATA) -> list[Entry]:
     """
     text = Path(path).read_text(encoding="utf-8")
     try:
-        tables = [dict(table) for table in tomllib.loads(text)["fact"]]
-    except KeyError:
-        raise ValueError(
-            f"{path}: not a file of facts: it has no table [[fact]]; add one for each fact"
-        ) from None
-    except (TypeError, ValueError) as error:
+        tables = tomllib.loads(text)
+    except ValueError as error:
         raise ValueError(f"{path}: not a file of facts: {error}") from None
-    return [_entry(table, f"{path}, fact {number}") for number, table in enumerate(tables, 1)]
+    facts = tables.get("fact")
+    if list(tables) != ["fact"] or not isinstance(facts, list):
+        raise ValueError(
+            f"{path}: not a file of facts: it must have one table [[fact]] for each fact and "
+            f"nothing else, got {', '.join(tables) or 'nothing'}"
+        )
+    return [_entry(table, f"{path}, fact {number}") for number, table in enumerate(facts, 1)]
 
 
 def _entry(table: dict[str, Any], where: str) -> Entry:
