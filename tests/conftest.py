@@ -8,6 +8,7 @@ import mujoco
 import pytest
 
 import mjhill
+import mjhill.identification.facts
 from mjhill.engine.callbacks import mujoco_library
 from mjhill.engine.spec import joint_spec
 
@@ -43,6 +44,12 @@ def _callbacks_are_left_as_they_were():
         getattr(mujoco, f"set_{name}")(None)
     assert left == [None, None, None]
     assert mjhill.installed_backend() is None
+
+
+@pytest.fixture(scope="session")
+def shipped_facts() -> list[mjhill.identification.facts.Fact]:
+    """Every published fact on the joints that come with mjhill; measured once, in about 10 s."""
+    return mjhill.identification.facts.facts()
 
 
 @pytest.fixture

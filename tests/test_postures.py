@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import mjhill
+from mjhill.lab.batch import joint_angles
 from mjhill.lab.postures import (
     balancing_excitations,
     check_ascending,
@@ -16,7 +17,7 @@ from mjhill.lab.postures import (
     static_stiffness,
     tonic_excitations,
 )
-from mjhill.lab.rig import UnmeasuredError, angle_series, at_rest, build_rig, net_torque
+from mjhill.lab.rig import UnmeasuredError, net_torque
 
 
 def symmetric(optimum):
@@ -56,12 +57,11 @@ def test_a_balanced_joint_stays_and_an_unstable_one_drifts():
     elbow, nudge = mjhill.JOINTS["elbow"], np.radians(0.1)
     for angle in (elbow.home_angle, 1.9):
         inputs = balancing_excitations(elbow, 0.5, angle)
-        way = (
-            angle_series(
-                build_rig(elbow), at_rest(build_rig(elbow), angle + nudge, inputs), 4.0, {}
-            )
-            - angle
-        )
+        found = joint_angles(
+            [elbow], start=angle + nudge, before=[*inputs.values()],
+            excitation=[*inputs.values()], steps=4000,
+        )  # fmt: skip
+        way = found[0] - angle
         returns = static_stiffness(elbow, inputs, angle) > 0
         assert returns == (angle == 1.9)
         assert (way[-1] < nudge) == returns

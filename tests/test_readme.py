@@ -14,8 +14,7 @@ from mjhill.benchmarks import accuracy
 from mjhill.cli import main
 from mjhill.identification.facts import facts
 from mjhill.identification.free import free_parameters, value_of
-from mjhill.identification.literature_fit import published_rows
-from mjhill.identification.report import brief
+from mjhill.identification.rows import brief, published_rows
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

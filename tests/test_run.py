@@ -330,7 +330,7 @@ def test_a_control_that_is_not_finite_is_named_before_the_run(pair):
 @pytest.mark.parametrize("bad", [float("nan"), float("inf")])
 def test_an_input_that_turns_bad_names_itself_and_its_time(pair, bad):
     signal = mjhill.Signal(lambda t: bad if t > 0.02 else 0.1)
-    message = f"input of 'elbow_flexor' at 0.02.* s must be finite, got {bad}"
+    message = f"excitation of 'elbow_flexor' at 0.02.* s must be finite, got {bad}"
     with mjhill.installed(), pytest.raises(ValueError, match=message):
         mjhill.record(pair, rest(pair), duration=0.1, excitation={"elbow_flexor": signal})
 

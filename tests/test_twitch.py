@@ -7,7 +7,8 @@ from made_joint import MUSCLE, make_joint
 from matplotlib.figure import Figure
 
 import mjhill
-from mjhill.experiments.twitch import twitch
+from mjhill.experiments.twitch import muscle_twitch, twitch
+from mjhill.lab.batch import Rigs
 from mjhill.lab.dynamometer import (
     active_torque,
     compliant_machine,
@@ -15,7 +16,8 @@ from mjhill.lab.dynamometer import (
     run_paths,
     stiff_machine,
 )
-from mjhill.lab.rig import UnmeasuredError, muscle_torque
+from mjhill.lab.rig import UnmeasuredError, muscle_torque, strongest_angle
+from mjhill.lab.twitch import ACTION_POTENTIAL, twitches
 
 # --- the dynamometer
 
@@ -128,6 +130,81 @@ def test_a_twitch_is_drawn_and_ready_for_json():
     assert "mN·m" in figure.axes[0].get_ylabel()
     assert found.as_dict()["joint"] == "eye"
     assert set(found.recordings) == set(mjhill.JOINTS["eye"].muscles)
+
+
+# --- one action potential, on many joints at once
+
+
+def train(rate, duration=1.0, timestep=1e-3):
+    """Excitation over each step by action potentials at a rate [Hz], shape (1, steps, 2)."""
+    edges = timestep * np.arange(round(duration / timestep) + 1)
+    count = np.floor(edges * rate)
+    on = count + np.minimum((edges * rate - count) / rate / ACTION_POTENTIAL, 1.0) * 1.0
+    # time excited until each edge, in action potentials
+    return np.stack([np.diff(on) * ACTION_POTENTIAL / timestep, np.zeros(len(edges) - 1)], 1)[None]
+
+
+def test_a_train_of_action_potentials_fuses_to_tetanus_at_the_largest_rate():
+    rigs = Rigs([make_joint()], locked=True)
+
+    def torque(excitation):
+        found = rigs.run(start=0.0, excitation=excitation, steps=1000, record=["qfrc_actuator"])
+        return found["qfrc_actuator"][0, 500:, 0]
+
+    tetanus = torque([[[1.0, 0.0]]])
+    trains = [torque(train(rate)) for rate in (10.0, 30.0, 1 / ACTION_POTENTIAL)]
+    means = [float(one.mean() / tetanus.mean()) for one in trains]
+    ripples = [float(np.ptp(one) / one.mean()) for one in trains]
+    assert 0 < means[0] < means[1] < means[2] == pytest.approx(1.0, abs=1e-6)
+    assert ripples[0] > ripples[1] > ripples[2]
+    assert ripples[2] < 1e-3
+
+
+@pytest.mark.parametrize("name", list(mjhill.JOINTS))
+def test_a_locked_joint_and_one_on_a_dynamometer_twitch_alike(name):
+    joint = mjhill.JOINTS[name]
+    for muscle in joint.muscles:
+        locked, held = twitches([joint], muscle), muscle_twitch(joint, muscle)
+        # the dynamometer gives way by 0.2°, and its times are whole steps
+        assert locked.contraction[0] == pytest.approx(held.contraction, rel=0.02)
+        assert locked.half_relaxation[0] == pytest.approx(held.half_relaxation, rel=0.02)
+        assert locked.share[0] == pytest.approx(held.share, rel=0.02)
+        assert locked.torque.max() == pytest.approx(held.peak, rel=0.02)
+
+
+def test_joints_twitch_together_as_each_does_alone():
+    joints = [make_joint(replace(MUSCLE, excitation_tau=tau)) for tau in (0.02, 0.04)]
+    together = twitches(joints, "puller")
+    for k, joint in enumerate(joints):
+        alone = twitches([joint], "puller")
+        for name in ("contraction", "half_relaxation", "share"):
+            assert getattr(together, name)[k] == pytest.approx(getattr(alone, name)[0], rel=1e-9)
+    assert together.contraction[1] > together.contraction[0]
+
+
+def test_a_twitch_peaks_later_and_relaxes_more_slowly_with_larger_time_constants():
+    slow = replace(MUSCLE, excitation_tau=0.06, deactivation_tau=0.08)
+    found = twitches([make_joint(), make_joint(slow)], "puller")
+    assert found.contraction[1] > found.contraction[0] > 0
+    assert found.half_relaxation[1] > found.half_relaxation[0] > 0
+    assert ((found.share > 0) & (found.share < 1)).all()
+
+
+def test_a_twitch_is_isometric_at_the_angle_of_the_largest_force():
+    joint = make_joint(replace(MUSCLE, optimal_length=0.3))
+    angle = muscle_twitch(joint, "puller").recording["joint.angle"]
+    assert angle[0] == pytest.approx(-0.3)
+    assert np.ptp(angle) < radians(0.2)  # what the dynamometer gives way
+    assert strongest_angle(make_joint(range=(-0.1, 1.0)), "puller") == 0.0
+    assert strongest_angle(replace(joint, range=(-0.1, 1.0)), "puller") == -0.1
+
+
+def test_a_muscle_that_makes_no_torque_or_does_not_relax_is_not_measured():
+    with pytest.raises(UnmeasuredError, match="torque of puller does not rise after the impulse"):
+        twitches([make_joint()], "puller", width=0.0)
+    slow = make_joint(replace(MUSCLE, deactivation_tau=1.0))
+    with pytest.raises(UnmeasuredError, match="puller has not half relaxed 1 s after the impulse"):
+        twitches([slow], "puller", width=0.4)
 
 
 def test_progress_ends_at_one():

@@ -30,13 +30,11 @@ from mjhill.lab.rig import (
     record_run,
     strongest_angle,
 )
+from mjhill.lab.twitch import ACTION_POTENTIAL
 from mjhill.literature.facts import read_entries
 from mjhill.simulate.recording import Recording
-from mjhill.simulate.signals import Signal, pulse
+from mjhill.simulate.signals import Signal
 
-# [s]; an excitation of 1 is the largest firing rate (sect. 4.1.2), so one action potential has the
-# area of one over that rate: 60 Hz, at which plantarflexors fuse (Sale et al. 1982)
-ACTION_POTENTIAL = 1 / 60
 _TWITCH_TIME = 1.0  # length of a run [s]
 _TETANUS_TIME = 1.5  # [s]
 _OVER = 0.05  # share of its peak that is left of a twitch that is over, at most
@@ -84,7 +82,8 @@ def muscle_twitch(joint: Joint, muscle: str, *, width: float = ACTION_POTENTIAL)
     setup = build_rig(joint, machine=machine)
     signals: dict[str, Signal | float] = {
         "dynamometer": balancing_control(joint, machine, angle),
-        muscle: pulse(1.0, 0.0, width),
+        # over each step its mean: the impulse need not last whole steps
+        muscle: Signal(lambda t: min(max((width - t) / setup.timestep + 0.5, 0.0), 1.0)),
     }
     recording = record_run(setup, at_rest(setup, angle), _TWITCH_TIME, excitation=signals)
     reading = -direction(joint, muscle) * recording["dynamometer.force"]

@@ -91,12 +91,11 @@ def _check_muscle(entry: Entry, joint: Joint) -> None:
 
 
 def _fact(entry: Entry, joint: Joint) -> Fact:
-    measured, note = None, ""
+    measured: float | None
     try:
-        measured = float(measure(entry, [joint])[0])
-        note = remark(entry, joint)
+        measured, note = float(measure(entry, [joint])[0]), remark(entry, joint)
     except UnmeasuredError as reason:
-        note = str(reason)
+        measured, note = None, str(reason)
     return Fact(
         entry.joint,
         entry.quantity,

@@ -31,7 +31,7 @@ class Measurement:
     Attributes:
         source: The file.
         time: Sample times [s], shape (T,), ascending, evenly spaced or not.
-        excitation: Neural input [-], 0 to 1, by muscle of the joint, each of shape (T,).
+        excitation: Excitation [-], 0 to 1, by muscle of the joint, each of shape (T,).
         angle: Angle of the joint [rad], shape (T,).
         torque: External torque on the joint, gravity included [N·m], shape (T,), positive towards
             positive angles.

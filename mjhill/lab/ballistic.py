@@ -56,7 +56,7 @@ class Pulses:
 
 @dataclass(frozen=True)
 class BallisticMovements:
-    """Movements of N joints that go their amplitude and no farther.
+    """Movements of N joints that stop at their amplitude and then stay near it.
 
     Attributes:
         pulses: Widths of their pulses.
@@ -102,7 +102,7 @@ def peaks(values: _Values) -> _Values:
     slope = 0.5 * (after - before)
     gain = np.divide(-0.5 * slope**2, bend, out=np.zeros_like(bend), where=bend < 0)
     inside = np.abs(slope) <= -bend
-    return np.where(inside, here + gain, values.max(axis=1))
+    return np.asarray(np.where(inside, here + gain, values.max(axis=1)))
 
 
 def _first_peak(values: _Values) -> tuple[_Values, NDArray[np.intp]]:
@@ -192,7 +192,7 @@ class _Movement:
         progress, _ = self.run(pulse, brake)
         top, where = _first_peak(progress)
         later = np.arange(progress.shape[1]) >= where[:, None]
-        back, _ = _first_peak(np.where(later, -progress, -top[:, None]))
+        back = peaks(np.where(later, -progress, -top[:, None]))
         return np.stack([top - 1.0, top + back - FALL_BACK])
 
     # --- one joint: a search from nothing
@@ -296,7 +296,7 @@ def ballistic_movements(
 
     Without a brake, the pulse is just wide enough to reach the new angle and not pass it. With a
     brake, the pulse is the widest for which the brake stops the joint at the new angle and the
-    joint then comes back by no more than 5 %.
+    joint then comes back by no more than 5 %. In both, it never passes that angle by more than 5 %.
 
     Args:
         joints: N joints with the same muscles and gears; other numbers may differ.
@@ -319,7 +319,11 @@ def ballistic_movements(
     movement = _Movement(joints, muscle, **options)
     pulses = movement.solve(guess)
     progress, velocity = movement.run(pulses.agonist, pulses.brake)
-    time = np.arange(movement.steps + 1) * movement.timestep
+    if progress.max() > 1.0 + FALL_BACK:
+        raise UnmeasuredError(
+            f"it stops at its new angle and then passes it by {progress.max() - 1.0:.0%}"
+        )
+    time = np.asarray(np.arange(movement.steps + 1) * movement.timestep, dtype=np.float64)
     return BallisticMovements(pulses, time, progress, velocity)
 
 

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from math import pi
 
 import mujoco
-import mujoco.rollout
 import numpy as np
-from numpy.typing import NDArray
 
 from mjhill.engine.equilibrium import equilibrate
 from mjhill.engine.install import installed, without_python_callbacks
@@ -24,7 +22,6 @@ from mjhill.simulate.signals import Signal
 
 _TIMESTEP = 1e-3  # of most joints [s]
 _TIMESTEPS = {"eye": 0.5e-3}  # [s]; the eye is ten times as fast
-_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS  # time, angle, velocity, then muscle states
 
 
 class UnmeasuredError(RuntimeError):
@@ -213,28 +210,6 @@ def record_run(
             )
         except RuntimeError as error:
             raise UnmeasuredError(str(error)) from error
-
-
-def angle_series(
-    rig: Rig, start: mujoco.MjData, duration: float, excitation: Mapping[str, Signal]
-) -> NDArray[np.float64]:
-    """Joint angle [rad] at every step of the run that ``record_run`` would record, shape (T + 1,).
-
-    Bit for bit the same, thirty times as fast, and ``start`` is not changed: made for searches.
-    """
-    steps = round(duration / rig.timestep)
-    control = np.tile(start.ctrl, (1, steps, 1))
-    for name, signal in excitation.items():
-        index = rig.model.actuator_ctrladr[rig.model.actuator(name).id]
-        # constant over each step, with the value at mid-step, as in a recorded run
-        control[0, :, index] = [signal((k + 0.5) * rig.timestep) for k in range(steps)]
-    state = np.empty(mujoco.mj_stateSize(rig.model, _STATE))
-    mujoco.mj_getState(rig.model, start, state, _STATE)
-    with installed():
-        states, _ = mujoco.rollout.rollout(
-            rig.model, mujoco.MjData(rig.model), state[np.newaxis], control
-        )
-    return np.concatenate([state[1:2], states[0, :, 1]])
 
 
 def direction(joint: Joint, muscle: str) -> float:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
-from math import pi
+from dataclasses import MISSING, dataclass, fields
+from math import isfinite, pi
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -81,30 +81,60 @@ def read_entries(path: str | Path = _DATA) -> list[Entry]:
     """The entries of a file of facts; by default the one that comes with mjhill.
 
     Raises:
-        ValueError: The file is not TOML, or an entry is incomplete, names a measure or unit that
-            does not exist, or has an interval that does not ascend.
+        ValueError: The file is not TOML, or an entry is incomplete, has no source, names a measure
+            or unit that does not exist, or has an interval that does not ascend. The message names
+            the file and the fact.
         FileNotFoundError: There is no such file.
     """
     text = Path(path).read_text(encoding="utf-8")
     try:
-        entries = [Entry(**{"arguments": {}, **table}) for table in tomllib.loads(text)["fact"]]
-    except (KeyError, TypeError, ValueError) as error:
+        tables = tomllib.loads(text)
+    except ValueError as error:
         raise ValueError(f"{path}: not a file of facts: {error}") from None
-    for entry in entries:
-        _check_entry(entry)
-    return entries
+    facts = tables.get("fact")
+    if list(tables) != ["fact"] or not isinstance(facts, list):
+        raise ValueError(
+            f"{path}: not a file of facts: it must have one table [[fact]] for each fact and "
+            f"nothing else, got {', '.join(tables) or 'nothing'}"
+        )
+    return [_entry(table, f"{path}, fact {number}") for number, table in enumerate(facts, 1)]
 
 
-def _check_entry(entry: Entry) -> None:
+def _entry(table: dict[str, Any], where: str) -> Entry:
+    given = {"arguments": {}, **table}
+    keys = [field.name for field in fields(Entry)]
+    missing = [f.name for f in fields(Entry) if f.default is MISSING and f.name not in given]
+    unknown = [key for key in given if key not in keys]
+    if "joint" in given and "quantity" in given:
+        where += f" ({given['joint']}, {given['quantity']})"
+    if missing:
+        remedy = "; say which study it is from" if "source" in missing else ""
+        raise ValueError(f"{where}: {', '.join(missing)} missing{remedy}")
+    if unknown:
+        raise ValueError(f"{where}: unknown key {unknown[0]!r}; there are: {', '.join(keys)}")
+    entry = Entry(**given)
+    _check_entry(entry, where)
+    return entry
+
+
+def _check_entry(entry: Entry, where: str) -> None:
+    if not isinstance(entry.source, str) or not entry.source.strip():
+        raise ValueError(
+            f"{where}: source must say which study the interval is from, got {entry.source!r}"
+        )
     for what, name, known in (
         ("measure", entry.measure, MEASURES),
         ("unit", entry.unit, PER_SI),
     ):
         if name not in known:
-            raise ValueError(f"{name_of(entry)}: unknown {what} {name!r}; there are: {list(known)}")
+            raise ValueError(f"{where}: unknown {what} {name!r}; there are: {', '.join(known)}")
+    for name, end in (("low", entry.low), ("high", entry.high)):
+        if isinstance(end, bool) or not isinstance(end, int | float) or not isfinite(end):
+            raise ValueError(f"{where}: {name} must be a finite number, got {end!r}")
     if not entry.low < entry.high:
         raise ValueError(
-            f"{name_of(entry)}: low must be below high, got {entry.low:g} and {entry.high:g}"
+            f"{where}: low must be below high, got {entry.low:g} and {entry.high:g}; an interval "
+            "needs a width, such as mean - SD to mean + SD"
         )
 
 

@@ -1,4 +1,4 @@
-"""Table 2 of the paper: steps of input to a free joint, as fits of a second-order system.
+"""Table 2 of the paper: steps of excitation of a free joint, as fits of a second-order system.
 
 The printed time constants of some rows contradict the J, B and K printed beside them; those
 rows carry corrected ones, and the note in ``table2.csv`` says why.
@@ -31,7 +31,8 @@ class Row:
         printed: T1 and T2 [s], as printed.
         stiffness: K of the fit [N·m/rad], as printed.
         damping: B of the fit [N·m·s/rad], as printed.
-        gain: K MAG over input and maximum torque [-], as printed; the paper does not define it.
+        gain: K MAG over excitation and maximum torque [-], as printed; the paper does not
+            define it.
         note: What is wrong with the printed values; empty if nothing is.
     """
 

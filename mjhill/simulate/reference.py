@@ -273,7 +273,7 @@ def _array_equations(
 
 
 def _knots(breaks: Iterable[tuple[float, ...]], end: float) -> list[float]:
-    """Times of restart: 0, every jump inside the run, its end; sums of inputs may repeat one."""
+    """Times of restart: 0, every jump inside the run, its end; sums of signals may repeat one."""
     knots = [0.0]
     for time in sorted(itertools.chain.from_iterable(breaks)):
         if knots[-1] + 1e-9 < time < end - 1e-9:

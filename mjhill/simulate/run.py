@@ -154,11 +154,16 @@ def _inputs(
     dofs = [(int(model.jnt_dofadr[joint_id(model, name)]), name, s) for name, s in loads.items()]
 
     def apply(data: mujoco.MjData, time: float) -> None:
-        for array, targets in ((data.ctrl, controls), (data.qfrc_applied, dofs)):
+        for what, array, targets in (
+            ("excitation", data.ctrl, controls),
+            ("torque", data.qfrc_applied, dofs),
+        ):
             for index, name, signal in targets:
                 value = signal(time)
                 if not np.isfinite(value):
-                    raise ValueError(f"input of {name!r} at {time:g} s must be finite, got {value}")
+                    raise ValueError(
+                        f"{what} of {name!r} at {time:g} s must be finite, got {value}"
+                    )
                 array[index] = value
 
     return apply
