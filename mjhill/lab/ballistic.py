@@ -102,7 +102,7 @@ def peaks(values: _Values) -> _Values:
     slope = 0.5 * (after - before)
     gain = np.divide(-0.5 * slope**2, bend, out=np.zeros_like(bend), where=bend < 0)
     inside = np.abs(slope) <= -bend
-    return np.where(inside, here + gain, values.max(axis=1))
+    return np.asarray(np.where(inside, here + gain, values.max(axis=1)))
 
 
 def _first_peak(values: _Values) -> tuple[_Values, NDArray[np.intp]]:
@@ -319,7 +319,7 @@ def ballistic_movements(
     movement = _Movement(joints, muscle, **options)
     pulses = movement.solve(guess)
     progress, velocity = movement.run(pulses.agonist, pulses.brake)
-    time = np.arange(movement.steps + 1) * movement.timestep
+    time: _Values = np.arange(movement.steps + 1, dtype=np.float64) * movement.timestep
     return BallisticMovements(pulses, time, progress, velocity)
 
 

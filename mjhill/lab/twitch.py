@@ -80,7 +80,7 @@ def twitches(
     top = peaks(torque)
     if not (top > 0).all():
         raise UnmeasuredError(f"the torque of {muscle} does not rise after the impulse")
-    time = np.arange(torque.shape[1]) * timestep
+    time: _Values = np.arange(torque.shape[1], dtype=np.float64) * timestep
     at = np.array([_time_of_peak(row, timestep) for row in torque])
     half = np.array([_time_of_half(time, row, peak) for row, peak in zip(torque, top, strict=True)])
     if np.isnan(half).any():
