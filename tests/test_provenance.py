@@ -7,6 +7,7 @@ import pytest
 
 import mjhill
 from mjhill import identification
+from mjhill.identification.free import free_parameters
 from mjhill.joints.reader import parameter_file, read_joints
 from mjhill.lab.rig import at_rest, build_rig, record_run
 
@@ -40,11 +41,20 @@ def sources(path):
     return elbow["damping"]["source"], extensor["excitation_tau"]["source"]
 
 
+def bounds(name):
+    """Bounds of a parameter of the elbow, in the file that comes with mjhill."""
+    (free,) = (free for free in free_parameters("elbow") if free.name == name)
+    return free.low, free.high
+
+
 def test_a_fitted_value_names_the_file_its_hash_and_where_its_bounds_come_from(file, written):
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     before, _ = sources(parameter_file())
     fitted, _ = sources(written)
-    assert fitted.startswith(f"fitted to trial.csv (SHA-256 {digest[:12]}) within 0.05 to 0.5: ")
+    low, high = bounds("damping")
+    assert fitted.startswith(
+        f"fitted to trial.csv (SHA-256 {digest[:12]}) within {low:g} to {high:g}: "
+    )
     assert "% from the data, 95 % interval " in fitted
     assert fitted.endswith(f"; bounds: {before}")
     joint = read_joints(written)["elbow"]
@@ -55,9 +65,10 @@ def test_a_fitted_value_names_the_file_its_hash_and_where_its_bounds_come_from(f
 def test_a_value_that_the_data_do_not_inform_says_so(file, written):
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     _, untold = sources(written)
+    low, high = bounds("elbow_extensor.excitation_tau")
     assert untold.startswith(
         f"not informed by trial.csv (SHA-256 {digest[:12]}): 0 % from the data, so the value is "
-        "that of the bounds 0.028 to 0.045; bounds: "
+        f"that of the bounds {low:g} to {high:g}; bounds: "
     )
 
 
