@@ -149,12 +149,51 @@ def test_the_torque_that_moves_a_joint_is_recovered_from_its_path(elbow):
         np.testing.assert_allclose(found[5:-5], torque[5:-5], atol=0.03 * np.ptp(torque))
 
 
+def stepped_torques(joint, path, excitation, timestep=1e-3):
+    """The torque on a path, from a simulation that is put on it anew before every step."""
+    model = joint_spec(joint).compile()
+    data = rest(model, path[0])
+    speed = np.diff(path, prepend=path[0]) / timestep
+    inertial = joint.inertia * np.gradient(np.gradient(path, timestep), timestep)
+    torque = np.empty(len(path))
+    with mjhill.installed():
+        for k in range(len(path)):
+            data.qpos[0], data.qvel[0], data.ctrl[:] = path[k], speed[k], excitation[k]
+            mujoco.mj_step(model, data)
+            torque[k] = inertial[k] - data.qfrc_passive[0] - data.qfrc_actuator[0]
+    return torque
+
+
+@pytest.mark.parametrize("name", mjhill.JOINTS)
+def test_a_driven_joint_is_on_its_path_at_every_step(name):
+    joint = mjhill.JOINTS[name]
+    low, high = joint.range
+    random = np.random.default_rng(4)
+    path = 0.5 * (low + high) + 0.4 * (high - low) * np.sin(8 * TIME)
+    path += 1e-3 * (high - low) * random.standard_normal(len(path))  # jerky, too
+    excitation = random.uniform(0, 1, (len(path), 2))
+    found = driving_torques([joint], path=path, excitation=excitation)[0]
+    expected = stepped_torques(joint, path, excitation)
+    # the path is summed up from its velocities, with their rounding
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * np.ptp(expected))
+
+
 def test_driven_joints_do_not_disturb_each_other(elbow):
     joints, path = varied(elbow), 1.0 + 0.2 * np.sin(10.0 * TIME)
     inputs = {"path": path, "excitation": np.full((len(path), 2), 0.3)}
     together = driving_torques(joints, **inputs)
     for joint, row in zip(joints, together, strict=True):
         np.testing.assert_array_equal(row, driving_torques([joint], **inputs)[0])
+
+
+def test_each_joint_may_have_a_path_and_excitations_of_its_own(elbow):
+    joints = varied(elbow)[:2]
+    paths = np.stack([1.0 + 0.2 * np.sin(10 * TIME), 0.9 + 0.1 * np.cos(6 * TIME)])
+    excitation = np.random.default_rng(6).uniform(0, 1, (2, len(TIME), 2))
+    together = driving_torques(joints, path=paths, excitation=excitation)
+    for joint, path, inputs, row in zip(joints, paths, excitation, together, strict=True):
+        alone = driving_torques([joint], path=path, excitation=inputs)[0]
+        np.testing.assert_array_equal(row, alone)
 
 
 # --- callbacks

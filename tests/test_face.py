@@ -82,7 +82,7 @@ def test_a_joint_is_identified_from_python(tmp_path):
     assert found.predictions == ()
     with pytest.raises(ValueError, match="unknown joint 'toe'; there are: elbow"):
         mjhill.identify("toe")
-    with pytest.raises(ValueError, match="predict, only, torque and decimal need measurements"):
+    with pytest.raises(ValueError, match="inputs, delay, torque and decimal need measurements"):
         mjhill.identify("elbow", only=["damping"])
 
 

@@ -9,6 +9,7 @@ import pytest
 import mjhill
 from mjhill.identification import FitError
 from mjhill.identification.measurement import Measurement
+from mjhill.identification.movement import Prediction
 from mjhill.lab.rig import at_rest, build_rig, record_run
 
 
@@ -70,9 +71,23 @@ def test_a_common_fault_is_named(measured, fault, cause):
     assert caught.value.result.predictions[0].explained < 0.5
 
 
+def test_an_offset_explains_nothing(measured):
+    angle = measured.angle
+    spread = float(np.std(angle))
+
+    def explained(predicted):
+        return Prediction(measured, "angle", angle, predicted).explained
+
+    assert explained(angle) == 1.0
+    assert explained(angle + 0.5 * spread) == pytest.approx(0.75)
+    assert explained(angle + spread) == pytest.approx(0.0)
+    assert explained(np.full_like(angle, angle.mean())) == pytest.approx(0.0)
+    assert explained(angle + 2 * spread) == pytest.approx(-3.0)
+
+
 def test_a_fault_that_is_none_of_the_common_ones_says_where_to_look(measured):
     noise = np.random.default_rng(0).normal(1.2, 0.2, len(measured))
-    with pytest.raises(FitError, match="look at the units, the sign of the torque and of the ang"):
+    with pytest.raises(FitError, match="look at the units, the sign and zero of the angle"):
         fit(replace(measured, angle=noise))
 
 
@@ -96,5 +111,5 @@ def test_the_error_survives_a_process(measured):
 def test_options_of_files_are_refused_for_what_has_been_read(measured):
     with pytest.raises(ValueError, match="trial.csv: torque and decimal are about files"):
         fit(measured, torque=0.0)
-    with pytest.raises(ValueError, match="predict, only, torque and decimal need measurements"):
+    with pytest.raises(ValueError, match="torque and decimal need measurements"):
         mjhill.identify("elbow", decimal=",")

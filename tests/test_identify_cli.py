@@ -86,6 +86,36 @@ def test_a_measurement_is_fitted_and_the_other_parameters_stay(tmp_path, measure
     assert names(tmp_path / "out") == ["elbow.png", "identify.json", "joints.toml"]
 
 
+def test_a_trial_made_by_run_gives_the_truth_again(tmp_path):
+    trial = tmp_path / "trial.csv"
+    inputs = ("--excite", "elbow_flexor=0.6@0.1:0.5", "--torque", "elbow=2@1")
+    run = CliRunner().invoke(
+        main, ["run", "elbow", *inputs, "--duration", "1.5", "--output", str(trial)]
+    )
+    assert run.exit_code == 0, run.stderr
+    flexor = mjhill.JOINTS["elbow"].muscles["elbow_flexor"]
+    names = ("max_isometric_force", "excitation_tau")
+    fits = [word for name in names for word in ("--fit", f"elbow_flexor.{name}")]
+    result = identify("elbow", "-d", trial, *fits, "--delay", "-o", tmp_path / "out", "--json")
+    assert result.exit_code == 0, result.stderr
+    report = json.loads(result.stdout)
+    (row,) = report["Measurements"]
+    assert row["inputs"] == "held"
+    *rows, delay = report["Parameters"]
+    for name, row in zip(names, rows, strict=True):
+        assert row["value"] == pytest.approx(getattr(flexor, name), rel=1e-4)
+    assert (delay["parameter"], delay["bounds from"], delay["up to"]) == ("delay", 0.0, 0.1)
+    assert delay["95 % from"] == 0.0
+    assert delay["value"] < 1e-5
+
+
+def test_inputs_are_joined_when_told_so(tmp_path, measurement):
+    fit = ("elbow", "-d", measurement, "--fit", "damping", "-o", tmp_path / "out", "--json")
+    for option, word in (("--join", "joined"), ("--hold", "held")):
+        (row,) = json.loads(identify(*fit, option).stdout)["Measurements"]
+        assert row["inputs"] == word
+
+
 def test_a_bad_cell_is_named_and_nothing_is_written(tmp_path, measurement):
     lines = measurement.read_text(encoding="utf-8").splitlines()
     cells = lines[99].split(",")
@@ -103,12 +133,11 @@ def test_a_bad_cell_is_named_and_nothing_is_written(tmp_path, measurement):
         (["wing"], "unknown joint 'wing'; there are: elbow, wrist"),
         (["-d", "x.csv"], "name the one joint that was measured, got 0"),
         (["elbow", "knee", "-d", "x.csv"], "name the one joint that was measured, got 2"),
-        (["elbow", "--fit", "damping"], "--predict, --fit, --torque and --decimal go with --data"),
-        (["elbow", "--torque", "0"], "--predict, --fit, --torque and --decimal go with --data"),
-        (
-            ["elbow", "--predict", "angle"],
-            "--predict, --fit, --torque and --decimal go with --data",
-        ),
+        (["elbow", "--fit", "damping"], "--hold, --join and --delay go with --data"),
+        (["elbow", "--torque", "0"], "--predict, --fit, --torque, --decimal, --hold"),
+        (["elbow", "--predict", "angle"], "--predict, --fit, --torque, --decimal, --hold"),
+        (["elbow", "--hold"], "--hold, --join and --delay go with --data"),
+        (["elbow", "--delay"], "--hold, --join and --delay go with --data"),
     ],
 )
 def test_wrong_arguments_end_in_one_line_and_leave_no_folder(arguments, message):
@@ -204,7 +233,7 @@ def test_radians_called_degrees_fail_with_the_cause_and_leave_only_the_figure(tm
         "elbow", "-d", path, "--torque", "0", "--predict", "angle", "--fit", "damping", "-o", out
     )
     refused(result, "the fit failed, as it explains less than 50 % of the variance", code=1)
-    assert f"{path}: -" in result.stderr
+    assert f"{path}: its angle is predicted worse than by its mean" in result.stderr
     assert "is its angle in radians, though its unit says degrees?" in result.stderr
     assert f"{out / 'elbow.png'} shows it, and no parameter file was written" in result.stderr
     assert result.stdout == ""

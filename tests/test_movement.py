@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import mjhill
-from mjhill.identification import movement
-from mjhill.identification.free import value_of
+from mjhill.identification.free import free_parameters, value_of
 from mjhill.identification.measurement import Measurement, read_measurement
-from mjhill.identification.movement import from_measurements
-from mjhill.lab.rig import at_rest, build_rig, record_run
+from mjhill.identification.movement import _Problem, from_measurements
+from mjhill.identification.trial import make_trial
+from mjhill.lab.batch import joint_angles
+from mjhill.lab.rig import UnmeasuredError, at_rest, build_rig, record_run
 from mjhill.simulate.reference import plant_torque
 
 NOISE = 0.003  # [rad], that of optical motion capture
@@ -60,6 +61,7 @@ def measured(recording, pick=slice(None)):
         {name: recording[f"{name}.u"][pick] for name in ("elbow_flexor", "elbow_extensor")},
         recording["elbow.angle"][pick],
         recording["elbow.applied"][pick],
+        simulated=float(recording.about["timestep"]),
     )
 
 
@@ -169,6 +171,16 @@ def test_each_measurement_may_be_predicted_in_its_own_way(subject):
     assert [p.quantity for p in predictions] == ["angle", "torque", "torque"]
 
 
+def test_a_noisy_angle_may_be_that_of_a_held_joint(subject):
+    clamp = held(subject, duration=0.2)
+    noise = 0.0035 * np.random.default_rng(3).standard_normal(len(clamp))
+    _, (prediction,) = from_measurements(
+        "elbow", [replace(clamp, angle=clamp.angle + noise)], only=["damping"]
+    )
+    assert np.ptp(noise) > 0.02
+    assert prediction.quantity == "torque"
+
+
 def test_times_may_be_uneven(subject):
     random = np.random.default_rng(2)
     recording = noisy(moved(subject))
@@ -182,7 +194,84 @@ def test_times_may_be_uneven(subject):
     check(result, subject, INFORMED)
 
 
-def test_inputs_go_straight_between_samples(subject):
+TIMES = (*INFORMED, "elbow_flexor.excitation_tau")
+FINE = 5e-5  # [s]
+
+
+def really(subject, rate, excitation, delay=0.0, seed=0):
+    """The true movement, by short steps, under an excitation of the flexor, as sampled."""
+    steps = round(0.8 / FINE)
+    middles = (np.arange(steps) + 0.5) * FINE
+    inputs = np.stack([excitation(middles - delay), 0 * middles], axis=1)
+    angle = joint_angles(
+        [subject], start=subject.home_angle, excitation=inputs, steps=steps, timestep=FINE
+    )[0]
+    time = np.arange(round(0.8 * rate) + 1) / rate
+    noise = NOISE * np.random.default_rng(seed).standard_normal(len(time))
+    return Measurement(
+        "real", time, {"elbow_flexor": excitation(time), "elbow_extensor": 0 * time},
+        angle[:: round(1 / (rate * FINE))] + noise, 0 * time,
+    )  # fmt: skip
+
+
+def pulses(time):
+    edges = np.array([0.1, 0.3, 0.5, 0.56]) - 1e-9  # free of rounding
+    on = np.searchsorted(edges, time) % 2 == 1
+    return 0.6 * on
+
+
+@pytest.mark.parametrize("rate", [100, 200, 1000])
+def test_pulses_of_a_stimulator_are_held_from_sample_to_sample(subject, rate):
+    measurement = really(subject, rate, pulses)
+    result, (prediction,) = from_measurements("elbow", [measurement], only=TIMES)
+    assert prediction.inputs == "held"
+    assert prediction.error == pytest.approx(NOISE, rel=0.2)  # 81 samples
+    for free, one in zip(result.free, result.estimates, strict=True):
+        # twice the half width is 99.99 % of a normal distribution
+        assert abs(one.value - value_of(subject, free)) < one.high - one.low, free.name
+
+
+def test_joined_pulses_come_half_a_sample_early(subject):
+    measurement = really(subject, 200, pulses)
+    taus = {}
+    for way in ("hold", "join"):
+        result, (prediction,) = from_measurements("elbow", [measurement], only=TIMES, inputs=way)
+        assert prediction.inputs == {"hold": "held", "join": "joined"}[way]
+        # what is left is noise only where the inputs are right
+        assert bool(prediction.notes) == (way == "join")
+        taus[way] = result.estimates[-1].value
+    assert taus["join"] > taus["hold"] + 1e-3  # the time constant makes up for some of it
+    result, _ = from_measurements("elbow", [measurement], only=INFORMED, inputs="join", delay=True)
+    assert result.delay.value == pytest.approx(2.5e-3, abs=0.5e-3)
+
+
+def test_a_delay_of_the_output_is_found(subject):
+    measurement = really(subject, 200, pulses, delay=0.03)
+    result, (prediction,) = from_measurements("elbow", [measurement], only=INFORMED, delay=True)
+    assert result.delay.low < 0.03 < result.delay.high
+    assert result.delay.high - result.delay.low < 5e-3
+    assert result.delay.bounds == (0.0, 0.1)
+    assert prediction.error == pytest.approx(NOISE, rel=0.2)
+    assert len(result.estimates) == len(result.free) == len(INFORMED)
+    assert "\ndelay: 0.0" in str(result)
+    without, (prediction,) = from_measurements("elbow", [measurement], only=TIMES)
+    assert without.delay is None
+    assert prediction.error > 5 * NOISE
+
+
+def test_noise_of_a_measured_torque_widens_the_intervals(subject):
+    # at 100 Hz, 0.3 N·m of it moves the elbow by more than the noise of its angle
+    measurement = really(subject, 100, pulses)
+    noise = TORQUE_NOISE * np.random.default_rng(5).standard_normal(len(measurement))
+    quiet, _ = from_measurements("elbow", [measurement], only=INFORMED)
+    shaken, _ = from_measurements("elbow", [replace(measurement, torque=noise)], only=INFORMED)
+    for one, other, free in zip(quiet.estimates, shaken.estimates, quiet.free, strict=True):
+        width = other.high - other.low
+        assert width > 2 * (one.high - one.low), one.name
+        assert abs(other.value - value_of(subject, free)) < width, one.name
+
+
+def test_smooth_inputs_go_straight_between_samples(subject):
     # held from sample to sample, 100 Hz would lengthen the time constants by 5 ms
     smooth = mjhill.Signal(lambda t: 0.25 - 0.25 * np.cos(12 * t))
     movement = moved(subject, excitation={"elbow_flexor": smooth}, torque=smooth)
@@ -196,20 +285,43 @@ def test_inputs_go_straight_between_samples(subject):
 
 def test_the_intervals_of_a_muscle_at_rest_hold_what_agrees_as_well(subject, monkeypatch):
     # a resting extensor drags a fast flexion only if it is slow enough, so its covariance
-    # depends on where the solution happens to be
+    # depends on where the solution happens to be; the true one is at the slow end of the bounds
     resting = "elbow_extensor.max_velocity"
+    free = next(one for one in free_parameters("elbow") if one.name == resting)
+    slow = replace(subject.muscles["elbow_extensor"], max_velocity=1.02 * free.low)
+    muscles = MappingProxyType({**subject.muscles, "elbow_extensor": slow})
+    someone = replace(subject, muscles=muscles)
+    measurement = measured(noisy(moved(someone)))
 
-    def fitted():
-        data = [measured(noisy(moved(subject)))]
-        result, _ = from_measurements("elbow", data, only=(*ONLY, resting))
-        return next(e for e in result.estimates if e.name == resting)
+    def found():
+        result, _ = from_measurements("elbow", [measurement], only=(*ONLY, resting))
+        return next(one for one in result.estimates if one.name == resting)
 
-    estimate = fitted()
-    assert estimate.low <= subject.muscles["elbow_extensor"].max_velocity <= estimate.high
-    monkeypatch.setattr(movement, "intervals", lambda _, solution, count: solution.ends[:count])
-    covariance = fitted()
-    assert estimate.informed < covariance.informed
-    assert estimate.high - estimate.low > 1.3 * (covariance.high - covariance.low)
+    estimate = found()
+    assert estimate.low <= slow.max_velocity <= estimate.high
+    monkeypatch.setattr(
+        "mjhill.identification.movement.intervals", lambda _, solution, count: solution.ends[:count]
+    )
+    assert not found().low <= slow.max_velocity
+
+
+def test_a_simulation_that_goes_bad_is_far_from_the_measurement(elbow, subject, monkeypatch):
+    trial = make_trial(measured(moved(subject)))
+    free = next(one for one in free_parameters("elbow") if one.name == "damping")
+    problem = _Problem(elbow, (free,), (trial,), delay=False)
+    points = np.zeros((problem.count, 3))
+    points[0] = [-1.0, 0.0, 1.0]
+    (sound,) = problem.predictions(points)
+
+    def run(joints, **inputs):
+        if any(joint.damping == free.value(0.0) for joint in joints):
+            raise UnmeasuredError("elbow: MuJoCo warned 'badqacc'")
+        return joint_angles(joints, **inputs)
+
+    monkeypatch.setattr("mjhill.identification.trial.joint_angles", run)
+    (found,) = problem.predictions(points)
+    np.testing.assert_array_equal(found[[0, 2]], sound[[0, 2]])
+    assert np.abs(found[1] - trial.measured).min() == pytest.approx(10 * trial.spread)
 
 
 def test_a_measurement_may_begin_with_a_gap(subject):
@@ -257,6 +369,7 @@ def still_life(**changes):
     [
         ({"joint": "wing"}, "unknown joint 'wing'; there are: elbow"),
         ({"only": ["strength"]}, "elbow: unknown free parameter 'strength'; there are: damping"),
+        ({"inputs": "held"}, "inputs must be one of hold, join, got 'held'"),
         ({"predict": "force"}, "predict must be one of angle, torque, got 'force'"),
         ({"only": ["postures.elbow_flexor"]}, "unknown free parameter 'postures.elbow_flexor'"),
         ({"predict": ["angle"] * 2}, "once, or once for each of the 1 measurements, got 2: angle"),

@@ -41,19 +41,17 @@ def sources(path):
     return elbow["damping"]["source"], extensor["excitation_tau"]["source"]
 
 
-def bounds(name):
-    """Bounds of a parameter of the elbow, in the file that comes with mjhill."""
-    (free,) = (free for free in free_parameters("elbow") if free.name == name)
-    return free.low, free.high
+def bounds():
+    """Those of the parameters, as text."""
+    return {one.name: f"{one.low:g} to {one.high:g}" for one in free_parameters("elbow")}
 
 
 def test_a_fitted_value_names_the_file_its_hash_and_where_its_bounds_come_from(file, written):
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     before, _ = sources(parameter_file())
     fitted, _ = sources(written)
-    low, high = bounds("damping")
     assert fitted.startswith(
-        f"fitted to trial.csv (SHA-256 {digest[:12]}) within {low:g} to {high:g}: "
+        f"fitted to trial.csv (SHA-256 {digest[:12]}) within {bounds()['damping']}: "
     )
     assert "% from the data, 95 % interval " in fitted
     assert fitted.endswith(f"; bounds: {before}")
@@ -65,10 +63,9 @@ def test_a_fitted_value_names_the_file_its_hash_and_where_its_bounds_come_from(f
 def test_a_value_that_the_data_do_not_inform_says_so(file, written):
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     _, untold = sources(written)
-    low, high = bounds("elbow_extensor.excitation_tau")
     assert untold.startswith(
         f"not informed by trial.csv (SHA-256 {digest[:12]}): 0 % from the data, so the value is "
-        f"that of the bounds {low:g} to {high:g}; bounds: "
+        f"that of the bounds {bounds()[ONLY[1]]}; bounds: "
     )
 
 
@@ -79,6 +76,7 @@ def test_the_top_of_the_file_says_how_it_was_made(file, written):
     assert f"# elbow: fitted by mjhill {mjhill.__version__}, mjhill.identify" in head
     assert f"#   trial.csv: SHA-256 {digest}," in head
     assert "301 rows, angle predicted, 100.00 % of its variance explained" in head
+    assert "#     inputs between rows: held\n" in head
     assert f"#   fitted: {', '.join(ONLY)}\n" in head
     assert "less than 10 % from the data and so the value of the bounds: elbow_extensor.exc" in head
     assert "is that of joints.toml, which comes with mjhill." in head

@@ -16,7 +16,9 @@ NAMES = ("accuracy", "balance", "cost", "threads", "start", "video")
 # on two cores without a graphics card
 SECONDS = {"accuracy": 10, "balance": 10, "cost": 20, "threads": 10, "start": 30, "video": 230}
 # run only by name, one at a time
-LONG = {"sweep": 120, "fuzz": 300, "checks": 150, "endurance": 90, "literature": 500}
+LONG = {
+    "sweep": 120, "fuzz": 300, "checks": 150, "endurance": 90, "literature": 500, "intervals": 900,
+}  # fmt: skip
 
 
 def run(

@@ -233,13 +233,17 @@ def compare(
 @click.option(
     "--count",
     type=click.IntRange(1),
-    help="sweep: systems of each kind; fuzz, checks: models; endurance: steps.",
+    help="sweep: systems of each kind; fuzz, checks: models; endurance: steps; intervals: fits.",
 )
 @click.option(
     "--kind", multiple=True,
-    help="sweep, fuzz: kind of model, several are possible; literature: variants or facts.",
+    help="sweep, fuzz: kind of model; intervals: kind of inputs; several are possible; "
+    "literature: variants or facts.",
 )  # fmt: skip
-@click.option("--case", metavar="KIND:NUMBER", help="sweep, fuzz, checks: run one model again.")
+@click.option(
+    "--case", metavar="KIND:NUMBER",
+    help="sweep, fuzz, checks: run one model again; intervals: one fit, JOINT:KIND:RATE:NUMBER.",
+)  # fmt: skip
 @json_option
 def bench(
     names: tuple[str, ...],
@@ -256,7 +260,8 @@ def bench(
     More benchmarks, one at a time, with their time on two cores: sweep, random systems against
     the reference solver (2 minutes); fuzz, 100,000 random models (5 minutes); checks, check_model
     on sound and unsound models (3 minutes); endurance, 10⁸ steps (2 minutes); literature, the
-    joints fitted in other ways (8 minutes).
+    joints fitted in other ways (8 minutes); intervals, 900 simulated measurements fitted back
+    (15 minutes).
     """
     from mjhill import benchmarks
 

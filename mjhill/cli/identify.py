@@ -54,6 +54,19 @@ _DETAIL = ("Table 2", "Passive torques and ranges of motion", "Facts")  # only i
     "what the cells say.",
 )  # fmt: skip
 @click.option(
+    "--hold", "inputs", flag_value="hold", default=None,
+    help="Inputs hold each value until the next sample, as digital stimulators do. By default "
+    "each input is taken as it looks: held if it has plateaus and jumps.",
+)  # fmt: skip
+@click.option(
+    "--join", "inputs", flag_value="join",
+    help="Inputs go in straight lines from sample to sample, as EMG envelopes nearly do.",
+)  # fmt: skip
+@click.option(
+    "--delay", is_flag=True,
+    help="Fit a delay too, 0 to 100 ms, by which the excitations act later than measured.",
+)  # fmt: skip
+@click.option(
     "--parameters", type=click.Path(path_type=Path),
     help="Parameter file with bounds; by default the one that comes with mjhill.",
 )  # fmt: skip
@@ -71,6 +84,8 @@ def identify(
     only: tuple[str, ...],
     torque: tuple[float, ...],
     decimal: tuple[str, ...],
+    inputs: str | None,
+    delay: bool,
     parameters: Path | None,
     output: Path,
     as_json: bool,
@@ -92,10 +107,10 @@ def identify(
 
     if data and len(joints) != 1:
         raise ValueError(f"name the one joint that was measured, got {len(joints)}")
-    if not data and (predict or only or torque or decimal):
+    if not data and (predict or only or torque or decimal or inputs or delay):
         raise ValueError(
-            "--predict, --fit, --torque and --decimal go with --data; the literature is fitted "
-            "whole"
+            "--predict, --fit, --torque, --decimal, --hold, --join and --delay go with --data; the "
+            "literature is fitted whole"
         )
     if data and (fix or start != "relaxed"):
         raise ValueError("--fix and --start are about the literature; leave them out with --data")
@@ -103,7 +118,13 @@ def identify(
     names = _known(joints, parameters)
     files = _files(names, output, measured=bool(data))
     if data:
-        options = {"predict": predict or None, "torque": torque or None, "decimal": decimal or None}
+        options = {
+            "predict": predict or None,
+            "torque": torque or None,
+            "decimal": decimal or None,
+            "inputs": inputs,
+            "delay": delay,
+        }
         results = [_measured(names[0], data, files, only=only, parameters=parameters, **options)]
     else:
         results = _from_literature(names, parameters, fixed, start)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from mjhill.identification.fit import Identified
 from mjhill.identification.measurement import RANGE_MARGIN, Measurement, largest_torque
-from mjhill.identification.movement import Prediction, make_trial
+from mjhill.identification.movement import Prediction
+from mjhill.identification.trial import make_trial
 from mjhill.joints.joint import Joint
 
 LEAST_EXPLAINED = 0.5  # of the variance of each measurement
@@ -39,20 +40,23 @@ class FitError(RuntimeError):
         return str(self.args[0])
 
 
-def check_explained(result: Identified, joint: Joint, predict: Sequence[str | None]) -> None:
+def check_explained(
+    result: Identified, joint: Joint, predict: Sequence[str | None], inputs: str | None = None
+) -> None:
     """Refuse a fit that explains too little.
 
     Args:
         result: The fit.
         joint: The joint before the fit, with which causes are tried.
         predict: What was asked to be predicted of each measurement.
+        inputs: How the inputs were said to go on between samples.
 
     Raises:
         FitError: It explains less than half of the variance of a measurement; the message has the
             likely cause, if a simple one would make the measurement plausible.
     """
     faults = [
-        _fault(prediction, joint, quantity)
+        _fault(prediction, joint, quantity, inputs)
         for prediction, quantity in zip(result.predictions, predict, strict=True)
         if not prediction.explained >= LEAST_EXPLAINED
     ]
@@ -65,24 +69,27 @@ def check_explained(result: Identified, joint: Joint, predict: Sequence[str | No
         )
 
 
-def _fault(prediction: Prediction, joint: Joint, quantity: str | None) -> str:
+def _fault(prediction: Prediction, joint: Joint, quantity: str | None, inputs: str | None) -> str:
     measurement = prediction.measurement
     tried = [
-        (_explained(joint, changed, quantity), text)
+        (_explained(joint, changed, quantity, inputs), text)
         for text, changed in _changes(measurement, joint)
     ]
     share, text = max(tried, default=(0.0, ""))
     if share < LEAST_EXPLAINED:
         text = (
-            "look at the units, the sign of the torque and of the angle, the columns, muscles that "
-            "are swapped, and the delay between excitation and movement"
+            "look at the units, the sign and zero of the angle, the sign of the torque, the "
+            "columns, muscles that are swapped, and the delay between excitation and movement "
+            "(--delay fits one)"
         )
     else:
         text += f" Then {100 * share:.0f} % are explained even before the fit"
-    return (
-        f"{measurement.source}: {100 * prediction.explained:,.0f} % of the variance of its "
-        f"{prediction.quantity} explained; {text}"
+    found = (
+        f"{100 * prediction.explained:.0f} % of the variance of its {prediction.quantity} explained"
     )
+    if prediction.explained < 0:
+        found = f"its {prediction.quantity} is predicted worse than by its mean"
+    return f"{measurement.source}: {found}; {text}"
 
 
 def _changes(measurement: Measurement, joint: Joint) -> Iterator[tuple[str, Measurement]]:
@@ -115,10 +122,12 @@ def _changes(measurement: Measurement, joint: Joint) -> Iterator[tuple[str, Meas
         yield "are its muscles swapped?", replace(measurement, excitation=dict(swapped))
 
 
-def _explained(joint: Joint, measurement: Measurement, quantity: str | None) -> float:
+def _explained(
+    joint: Joint, measurement: Measurement, quantity: str | None, inputs: str | None
+) -> float:
     """Share of the variance that a joint explains as it is; 0 where it cannot be run."""
     try:
-        trial = make_trial(joint, measurement, quantity)
+        trial = make_trial(measurement, quantity, inputs)
         predicted = trial.predict([joint], np.zeros((2, 1)))[0]
     except (ValueError, RuntimeError):
         return 0.0

@@ -16,6 +16,7 @@ from mjhill.joints.joint import Joint
 _DIFFERENCE = 1e-5  # of a parameter, in its standard deviations, for derivatives
 _STIFFEST = 1e4  # regularisation at which a fit that finds nothing better ends
 _ITERATIONS = 200
+_UNLIKE = 1e-3  # fall of the cost, a logarithm of likelihood, in which two points still differ
 _NEAR = 1e-6  # of a bound, in standard deviations
 CONFIDENT = 1.96  # standard deviations to either side that hold 95 % of a normal distribution
 
@@ -124,6 +125,7 @@ def solve(
     prior: float = 1.0,
     difference: float = _DIFFERENCE,
     tolerance: float = 1e-8,
+    stiffest: float = _STIFFEST,
 ) -> Solution:
     """Fit ``count`` free parameters.
 
@@ -133,8 +135,9 @@ def solve(
         progress: Called with the share done, 0 to 1, guessed from the steps so far.
         start: Deviations to start from, shape (P,); by default the middles of the bounds.
         prior: Weight of the priors.
-        difference: Of a parameter, in its standard deviations, for derivatives.
+        difference: Change of a parameter for slopes of the residuals, in standard deviations.
         tolerance: Step, in standard deviations, at which the fit has settled.
+        stiffest: Regularisation at which a fit that finds nothing better ends.
 
     Raises:
         RuntimeError: The fit did not settle.
@@ -151,13 +154,13 @@ def solve(
         all_residuals,
         bounds,
         eps=difference,
-        mu_max=_STIFFEST,
+        mu_max=stiffest,
         xtol=tolerance,
         max_iter=_ITERATIONS,
         verbose=mujoco.minimize.Verbosity.SILENT,
         iter_callback=report,
     )
-    if len(trace) >= _ITERATIONS:
+    if len(trace) >= _ITERATIONS and trace[-2].reduction > _UNLIKE:
         raise RuntimeError(f"the fit did not settle in {_ITERATIONS} iterations")
     point = point.reshape(count, 1)
     found = all_residuals(point)
@@ -167,6 +170,35 @@ def solve(
     covariance = np.linalg.inv(jacobian.T @ jacobian)
     cost = 0.5 * float((found**2).sum())
     return Solution(point[:, 0], covariance, jacobian, cost, found[:, 0])
+
+
+_WIDE = 0.02  # standard deviations of a prior, over which a slope is first taken
+_NARROW = 1e-4  # of these, the least
+
+
+def over_uncertainty(residuals: Residuals, solution: Solution) -> Solution:
+    """A solution with slopes taken over the range in which it is uncertain.
+
+    Residuals of a simulation have kinks and small jumps, where its steps are divided otherwise.
+    A slope over a much shorter range than the uncertainty shows these, and not the data.
+
+    Args:
+        residuals: What was solved.
+        solution: Its solution.
+    """
+    evaluate = with_priors(residuals)
+    point = solution.deviations
+    reach = np.full(point.size, _WIDE)
+    for _ in range(2):
+        low = np.maximum(point - reach, -DEVIATIONS)
+        high = np.minimum(point + reach, DEVIATIONS)
+        found = evaluate(
+            np.concatenate([np.diag(end - point) for end in (low, high)], axis=1) + point[:, None]
+        )
+        jacobian = (found[:, point.size :] - found[:, : point.size]) / (high - low)
+        covariance = np.linalg.inv(jacobian.T @ jacobian)
+        reach = np.maximum(np.sqrt(np.diag(covariance)), _NARROW)
+    return replace(solution, covariance=covariance, jacobian=jacobian)
 
 
 _RISE = 0.5 * CONFIDENT**2  # of the cost, at the end of an interval
@@ -291,7 +323,8 @@ def _improved(jacobian: _Values, place: _Place) -> _Values:
     for left, right in place.bends:
         bent = bent + np.outer(left, right[others])
     point = place.point.copy()
-    point[others] -= np.linalg.lstsq(bent, place.found, rcond=None)[0]
+    # by the normal equations: fast, and exact enough for a step that counts only if it helps
+    point[others] -= np.linalg.lstsq(bent.T @ bent, bent.T @ place.found, rcond=None)[0]
     return np.clip(point, -DEVIATIONS, DEVIATIONS)
 
 
@@ -317,6 +350,7 @@ class Identified:
         pinned: Parameters that were fixed, and their values.
         start: How the joint started a step of Table 2, ``relaxed`` or ``held``.
         held_back: For each piece of published evidence, what gets worse where it is met better.
+        delay: By how much the excitations act later than measured [s], if that was fitted.
     """
 
     joint: Joint
@@ -326,6 +360,12 @@ class Identified:
     pinned: tuple[tuple[Free, float], ...] = ()
     start: str = "relaxed"
     held_back: Mapping[str, str] = field(default_factory=dict)
+    delay: Estimate | None = None
+
+    @property
+    def all_estimates(self) -> tuple[Estimate, ...]:
+        """The estimates, with that of the delay."""
+        return self.estimates if self.delay is None else (*self.estimates, self.delay)
 
     def __str__(self) -> str:
         """A line for each parameter: value, interval of 95 % confidence, share from the data.
@@ -333,11 +373,11 @@ class Identified:
         Then one for each note on a measurement.
         """
         lines = [f"{self.joint.name}, fitted: value, 95 % interval, share from the data"]
-        for one in self.estimates:
+        for one in self.all_estimates:
             lines.append(
                 f"{one.name}: {one.value:.4g}, {one.low:.3g} to {one.high:.3g}, {one.informed:.0%}"
             )
         for prediction in self.predictions:
-            measurement = prediction.measurement
-            lines += [f"note: {measurement.source}: {note}" for note in measurement.notes]
+            source = prediction.measurement.source
+            lines += [f"note: {source}: {note}" for note in prediction.notes]
         return "\n".join(lines)

@@ -23,6 +23,8 @@ def identify(
     *,
     predict: str | Sequence[str] | None = None,
     only: Sequence[str] = (),
+    inputs: str | None = None,
+    delay: bool = False,
     parameters: str | Path | None = None,
     torque: float | Sequence[float] | None = None,
     decimal: str | Sequence[str] | None = None,
@@ -43,6 +45,9 @@ def identify(
         predict: ``angle`` or ``torque``, once for all measurements or once for each; by default
             torque where the joint is held still, angle elsewhere.
         only: Names of the parameters to fit; by default all that have bounds.
+        inputs: ``hold``: each value of an excitation or of the torque lasts until the next
+            sample; ``join``: straight lines go from sample to sample. By default as each looks.
+        delay: Whether to fit a delay of the excitations too, 0 to 0.1 s.
         parameters: Parameter file with bounds; by default the one that comes with mjhill.
         torque: A constant external torque [N·m], for files that have no column of it; once for
             all or once for each.
@@ -68,17 +73,26 @@ def identify(
     if joint not in known:
         raise ValueError(f"unknown joint {joint!r}; there are: {', '.join(known)}")
     if not measurements:
-        if predict or only or torque is not None or decimal:
-            raise ValueError("predict, only, torque and decimal need measurements; give them")
+        if predict or only or inputs or delay or torque is not None or decimal:
+            raise ValueError(
+                "predict, only, inputs, delay, torque and decimal need measurements; give them"
+            )
         return from_literature(joint, parameters, progress, fixed=fixed, start=start)
     if fixed or start != "relaxed":
         raise ValueError("fixed and start are about the literature; leave them out")
     read = _read(measurements, known[joint], torque, decimal)
     result, predictions = from_measurements(
-        joint, read, predict=predict, only=only, parameters=parameters, progress=progress
+        joint,
+        read,
+        predict=predict,
+        only=only,
+        inputs=inputs,
+        delay=delay,
+        parameters=parameters,
+        progress=progress,
     )
     result = replace(result, predictions=tuple(predictions))
-    check_explained(result, known[joint], _each("predict", predict, len(read)))
+    check_explained(result, known[joint], _each("predict", predict, len(read)), inputs)
     return result
 
 

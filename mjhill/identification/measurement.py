@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjhill.identification.columns import DECIMALS, Column, Columns, read_columns
+from mjhill.identification.inputs import simulated_step
 from mjhill.joints.joint import Joint
 
 _LEAST_SAMPLES = 50
@@ -36,6 +37,8 @@ class Measurement:
             positive angles.
         digest: SHA-256 of the file in hexadecimal digits; empty where there is none.
         notes: What was done to the numbers of the file, for people.
+        simulated: Timestep [s] of the simulation that this is a recording of, None of anything
+            else: its inputs were held over each step, and a fit takes the same steps.
     """
 
     source: str
@@ -45,6 +48,7 @@ class Measurement:
     torque: NDArray[np.float64]
     digest: str = ""
     notes: tuple[str, ...] = ()
+    simulated: float | None = None
 
     def __post_init__(self) -> None:
         """Check shapes.
@@ -120,6 +124,7 @@ def read_measurement(
         torque=columns.torque.values if columns.torque else rest + (torque or 0.0),
         digest=columns.digest,
         notes=tuple(notes if torque is None else [*notes, f"torque: {torque:g} N·m, as given"]),
+        simulated=simulated_step(path),
     )
 
 

@@ -9,165 +9,32 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mjhill.identification.fit import Identified, Solution, intervals, solve
+from mjhill.identification.fit import Identified, Solution, intervals, over_uncertainty, solve
 from mjhill.identification.free import Free, free_parameters, joint_at
+from mjhill.identification.inputs import WAYS
 from mjhill.identification.measurement import Measurement
+from mjhill.identification.noise import Noise, noise_of, white
+from mjhill.identification.trial import Trial, make_trial
 from mjhill.joints.joint import Joint
 from mjhill.joints.reader import read_joints
-from mjhill.lab.batch import driving_torques, joint_angles
+from mjhill.lab.rig import UnmeasuredError
 
 QUANTITIES = ("angle", "torque")  # what can be predicted
-_OTHER = {"angle": "torque", "torque": "angle"}
-_HELD = 0.02  # [rad], a joint that moves less is taken as held still
-_SMOOTHING = 10.0  # [Hz], cut-off of the path of a driven joint, usual for human movement
-_LONGEST_STEP = 1e-3  # [s]
-_LEAST_NOISE = 1e-4  # of the spread of what is predicted: no simulation is nearer to a joint
-_START_SPAN = 0.05  # [s] from whose samples the start is guessed
-_LEAST_SPREAD = 1e-6  # [rad] and [rad/s]
-
-_Values = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Trial:
-    """A measurement, and the run that is to predict it.
-
-    Attributes:
-        measurement: The measurement.
-        quantity: What is predicted: ``angle`` [rad] or ``torque`` [N·m].
-        time: Times of the samples from the first [s], shape (T,).
-        grid: Times of the steps [s], shape (S,).
-        excitation: Input of each muscle over each step, shape (S, muscles).
-        torque: External torque over each step [N·m], shape (S,).
-        path: Angle at each step [rad] where the torque is predicted, shape (S,); else None.
-        start: Angle [rad] and velocity [rad/s] at time 0, shape (2,).
-        start_spread: Their standard deviations, shape (2,).
-    """
-
-    measurement: Measurement
-    quantity: str
-    time: _Values
-    grid: _Values
-    excitation: _Values
-    torque: _Values
-    path: _Values | None
-    start: _Values
-    start_spread: _Values
-
-    @property
-    def measured(self) -> _Values:
-        """The quantity as measured, shape (T,)."""
-        return np.asarray(getattr(self.measurement, self.quantity))
-
-    @property
-    def spread(self) -> float:
-        """Largest less smallest of it, in its unit."""
-        return float(np.ptp(self.measured))
-
-    def predict(self, joints: Sequence[Joint], offsets: _Values) -> _Values:
-        """What joints do, shape (joints, T), with deviations of their starts, (2, joints)."""
-        timestep, before = float(self.grid[1]), self.excitation[0]
-        if self.path is not None:
-            run = driving_torques(
-                joints,
-                path=self.path,
-                before=before,
-                excitation=self.excitation,
-                timestep=timestep,
-            )
-        else:
-            start, velocity = self.start[:, None] + self.start_spread[:, None] * offsets
-            run = joint_angles(
-                joints,
-                start=start,
-                velocity=velocity,
-                before=before,
-                excitation=self.excitation[:-1],
-                torque=self.torque[:-1],
-                steps=len(self.grid) - 1,
-                timestep=timestep,
-            )
-        return np.array([np.interp(self.time, self.grid, row) for row in run])
-
-    def weight(self, predicted: _Values) -> float:
-        """Weight of a residual, from what a prediction leaves.
-
-        Residuals that hang together count as fewer: a series with correlation r from sample to
-        sample is worth (1 - r)/(1 + r) of its samples.
-        """
-        left = predicted - self.measured
-        noise = max(float(np.sqrt(np.mean(left**2))), _LEAST_NOISE * self.spread)
-        size = float(left @ left)
-        correlation = min(max(float(left[1:] @ left[:-1]) / size, 0.0), 0.999) if size else 0.0
-        return float(np.sqrt((1 - correlation) / (1 + correlation))) / noise
-
-
-def make_trial(joint: Joint, measurement: Measurement, predict: str | None = None) -> Trial:
-    """A measurement of a joint made ready.
-
-    Args:
-        joint: The joint.
-        measurement: The measurement.
-        predict: ``angle`` or ``torque``; by default torque where the joint is held still.
-
-    Raises:
-        ValueError: What is to be predicted never changes.
-    """
-    held = np.ptp(measurement.angle) < _HELD
-    quantity = predict or ("torque" if held else "angle")
-    if np.ptp(getattr(measurement, quantity)) == 0:
-        raise ValueError(
-            f"{measurement.source}: the {quantity} never changes, so there is nothing to "
-            f"predict; predict the {_OTHER[quantity]} instead"
-        )
-    time = measurement.time - measurement.time[0]
-    timestep = min(_LONGEST_STEP, float(np.median(np.diff(time))))
-    steps = int(np.ceil(time[-1] / timestep - 1e-6))  # free of rounding
-    grid: _Values = np.arange(steps + 1, dtype=np.float64) * timestep
-    inputs = [measurement.excitation[name] for name in joint.muscles]
-    return Trial(
-        measurement,
-        quantity,
-        time,
-        grid,
-        # held instead, samples would come half an interval late: 5 ms at 100 Hz
-        np.stack([np.interp(grid, time, values) for values in inputs], axis=1),
-        np.interp(grid, time, measurement.torque),
-        _smooth_path(time, measurement.angle, grid) if quantity == "torque" else None,
-        *_start(time, measurement.angle),
-    )
-
-
-def _smooth_path(time: _Values, angle: _Values, grid: _Values) -> _Values:
-    from scipy.signal import butter, sosfiltfilt
-
-    path = np.interp(grid, time, angle)
-    if np.ptp(path) < _HELD:
-        return np.full_like(path, float(np.mean(path)))
-    timestep = float(grid[1])
-    cutoff = min(_SMOOTHING, 0.4 / float(np.median(np.diff(time))))
-    sections = butter(2, cutoff, fs=1 / timestep, output="sos")
-    # ends go on for a period and a half of the cut-off, else the last torques are far off
-    beyond = min(round(1.5 / (cutoff * timestep)), len(path) - 1)
-    return np.asarray(sosfiltfilt(sections, path, padlen=beyond))
-
-
-def _start(time: _Values, angle: _Values) -> tuple[_Values, _Values]:
-    """Angle [rad] and velocity [rad/s] at time 0, and their spreads, from the first samples.
-
-    By a parabola, as the joint may already be speeding up. Its distance to a straight line is
-    doubted too: noise is not all that it can miss, and the bounds of a fit are hard.
-    """
-    # six samples or more, though the first come late where times are uneven
-    first = time <= max(_START_SPAN, time[:6].max())
-    parabola, covariance = np.polyfit(time[first], angle[first], 2, cov=True)
-    line = np.polyfit(time[first], angle[first], 1)
-    spread = np.abs(parabola[1:] - line) + 2 * np.sqrt(np.diag(covariance)[1:])
-    return parabola[:0:-1], spread[::-1] + _LEAST_SPREAD
-
-
+# [s]; from EMG to torque it is 30 to 100 ms in all (Cavanagh & Komi 1979), of which the model has
+# a part
+DELAY = Free(("delay",), 0.0, 0.1)
 _FIRST_NOISE = 0.02  # of the spread of what is predicted, until the fit says better
 _ROUNDS = 4
+_DIFFERENCE = 1e-3  # standard deviations; shorter ones find the kinks of a simulation
+_SETTLED = 1e-6  # standard deviations: a step so short is the last
+_STIFFEST = 1e8  # regularisation at which a fit ends; data without noise have steep residuals
+_SAME = 0.02  # of the noise, by which it may still change
+_FAR = 10.0  # times the spread of what is predicted
+_TOGETHER = 4.0  # residuals that count as one, from here on they are not called noise
+_SMALL = 1e-3  # of the spread of what is predicted, too little to be remarked on
+_OFF = 0.1  # standard deviations of all data together, by which a correction may still change
+
+_Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -179,12 +46,17 @@ class Prediction:
         quantity: What is predicted: ``angle`` [rad] or ``torque`` [N·m].
         measured: That quantity as measured, shape (T,).
         predicted: As predicted.
+        inputs: How the inputs were taken to go on between samples, in words.
+        together: Number of residuals that count as one, as they hang together; near 1 if only
+            noise is left.
     """
 
     measurement: Measurement
     quantity: str
     measured: _Values
     predicted: _Values
+    inputs: str = ""
+    together: float = 1.0
 
     @property
     def error(self) -> float:
@@ -193,8 +65,25 @@ class Prediction:
 
     @property
     def explained(self) -> float:
-        """Share of the measured variance that the prediction accounts for [-]."""
-        return 1.0 - float(np.var(self.predicted - self.measured) / np.var(self.measured))
+        """Share of the measured variance that the prediction accounts for [-].
+
+        An offset of the prediction counts as unexplained, so it is negative for a prediction
+        that is worse than the mean of the measurement.
+        """
+        return 1.0 - self.error**2 / float(np.var(self.measured))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was done to the numbers of the file, and what is odd about the rest, for people."""
+        notes = self.measurement.notes
+        if self.together < _TOGETHER or self.error < _SMALL * float(np.ptp(self.measured)):
+            return notes
+        return (
+            *notes,
+            f"what is left is no noise, as it hangs together over {self.together:.0f} samples: "
+            "maybe inputs are held or joined wrongly, excitations act late (a delay), or a "
+            "parameter that is not fitted is wrong; intervals do not show such errors",
+        )
 
 
 def from_measurements(
@@ -203,15 +92,17 @@ def from_measurements(
     *,
     predict: str | Sequence[str] | None = None,
     only: Sequence[str] = (),
+    inputs: str | None = None,
+    delay: bool = False,
     parameters: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Identified, list[Prediction]]:
     """Fit the free parameters of a joint to measurements of one subject.
 
     Each measurement starts with muscles steady at its first inputs, at an angle and a velocity
-    that are fitted besides. Its inputs go straight from sample to sample. The priors are those of
-    ``mjhill.identification.fit``: a parameter that the data say nothing about stays in the
-    middle of its bounds, and ``Estimate.informed`` is near 0.
+    that are fitted besides. The priors are those of ``mjhill.identification.fit``: a parameter
+    that the data say nothing about stays in the middle of its bounds, and ``Estimate.informed``
+    is near 0.
 
     Args:
         joint: The joint's name.
@@ -222,30 +113,65 @@ def from_measurements(
             elsewhere.
         only: Names of the parameters to fit, by default all that have bounds; the others keep
             the value of the parameter file.
+        inputs: How excitations and torque go on between samples: ``hold``: each value lasts
+            until the next sample; ``join``: in straight lines. By default as each of them looks,
+            see ``inputs.is_held``; in a recording of a simulation they are held.
+        delay: Whether to fit a delay too, by which the excitations act later than measured, the
+            same in all measurements, from 0 to 0.1 s; see ``Identified.delay``.
         parameters: The parameter file; by default the one that comes with mjhill.
         progress: Called with the share done, 0 to 1.
 
     Raises:
         ValueError: The joint or a parameter is unknown, there is no measurement, ``predict``
-            is neither or of another number, or what is to be predicted never changes.
+            or ``inputs`` is unknown or of another number, or what is to be predicted never
+            changes.
         RuntimeError: The fit did not settle.
     """
     if not measurements:
         raise ValueError("there is no measurement to fit; give at least one")
+    if inputs not in (None, *WAYS):
+        raise ValueError(f"inputs must be one of {', '.join(WAYS)}, got {inputs!r}")
     quantities = _quantities(predict, len(measurements))
     free = _chosen(free_parameters(joint, parameters), only, joint)
-    start = read_joints(parameters)[joint]
     trials = [
-        make_trial(start, measurement, quantity)
+        make_trial(measurement, quantity, inputs)
         for measurement, quantity in zip(measurements, quantities, strict=True)
     ]
-    solution, ends = _solve(start, free, trials, progress)
-    fitted = joint_at(start, free, solution.deviations[: len(free)])
-    predictions = []
-    for trial, offset in zip(trials, _offsets(solution.deviations, len(free)), strict=True):
-        predicted = trial.predict([fitted], offset)[0]
-        predictions.append(Prediction(trial.measurement, trial.quantity, trial.measured, predicted))
-    return Identified(fitted, tuple(free), tuple(solution.estimates(free, ends))), predictions
+    return fit_trials(read_joints(parameters)[joint], free, trials, delay=delay, progress=progress)
+
+
+def fit_trials(
+    joint: Joint,
+    free: Sequence[Free],
+    trials: Sequence[Trial],
+    *,
+    delay: bool = False,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[Identified, list[Prediction]]:
+    """Fit some parameters of a joint to trials.
+
+    Args:
+        joint: The joint; what is not fitted stays.
+        free: The parameters.
+        trials: The trials.
+        delay: As in ``from_measurements``.
+        progress: Called with the share done, 0 to 1.
+
+    Raises:
+        RuntimeError: The fit did not settle.
+    """
+    problem = _Problem(joint, tuple(free), tuple(trials), delay)
+    solution, ends, predicted, noises = _solve(problem, progress)
+    fitted = problem.joints(solution.deviations[:, None])[0]
+    predictions = [
+        Prediction(
+            trial.measurement, trial.quantity, trial.measured, values, trial.inputs, noise.together
+        )
+        for trial, values, noise in zip(trials, predicted, noises, strict=True)
+    ]
+    estimates = solution.estimates([*free, DELAY] if delay else free, ends)
+    late = estimates.pop() if delay else None
+    return Identified(fitted, tuple(free), tuple(estimates), delay=late), predictions
 
 
 def _quantities(predict: str | Sequence[str] | None, count: int) -> list[str | None]:
@@ -276,25 +202,92 @@ def _chosen(free: list[Free], only: Sequence[str], joint: str) -> list[Free]:
     return [item for item in free if not only or item.name in only]
 
 
+@dataclass(frozen=True)
+class _Problem:
+    """What is fitted to what.
+
+    A point is the deviations of the free parameters, of the delay if it is fitted, and of where
+    each trial starts and how fast.
+    """
+
+    joint: Joint
+    free: tuple[Free, ...]
+    trials: tuple[Trial, ...]
+    delay: bool
+
+    @property
+    def wanted(self) -> int:
+        """Number of parameters whose intervals are wanted."""
+        return len(self.free) + self.delay
+
+    @property
+    def count(self) -> int:
+        """Length of a point."""
+        return self.wanted + 2 * len(self.trials)
+
+    def joints(self, points: _Values) -> list[Joint]:
+        """The joints at K points, shape (count, K)."""
+        return [joint_at(self.joint, self.free, point[: len(self.free)]) for point in points.T]
+
+    def _settings(self, points: _Values) -> list[tuple[Trial, _Values, _Values | None]]:
+        """Each trial with offsets of its start, shape (2, K), and delays [s], shape (K,)."""
+        delays = None
+        if self.delay:
+            delays = np.array([DELAY.value(z) for z in points[len(self.free)].tolist()])
+        offsets = points[self.wanted :].reshape(-1, 2, points.shape[1])
+        return [(*pair, delays) for pair in zip(self.trials, offsets, strict=True)]
+
+    def predictions(self, points: _Values) -> list[_Values]:
+        """What K points predict of each trial, shape (K, T).
+
+        Where a simulation goes bad, as it may far from a solution, it is far from what was
+        measured.
+        """
+        joints = self.joints(points)
+        try:
+            return [
+                trial.predict(joints, offsets, delays)
+                for trial, offsets, delays in self._settings(points)
+            ]
+        except UnmeasuredError:
+            if len(joints) == 1:
+                return [(one.measured + _FAR * one.spread)[None] for one in self.trials]
+        alone = [self.predictions(point[:, None]) for point in points.T]
+        return [np.concatenate(rows) for rows in zip(*alone, strict=True)]
+
+    def known(self, point: _Values) -> list[tuple[_Values, _Values]]:
+        """At a point, for each trial: its correction and the errors of its input.
+
+        See ``Trial.correction`` and ``Trial.input_errors``.
+        """
+        joint = self.joints(point[:, None])[0]
+        return [
+            (
+                trial.correction(joint, offsets, delays),
+                trial.input_errors(joint, offsets, delays),
+            )
+            for trial, offsets, delays in self._settings(point[:, None])
+        ]
+
+
 def _solve(
-    start: Joint,
-    free: list[Free],
-    trials: list[Trial],
-    progress: Callable[[float], None] | None,
-) -> tuple[Solution, _Values]:
+    problem: _Problem, progress: Callable[[float], None] | None
+) -> tuple[Solution, _Values, list[_Values], list[Noise]]:
     """Fit, take the noise from what is left, and fit again until it no longer changes.
 
-    With the ends of the parameters' intervals of confidence.
+    Returns:
+        The solution, the ends of the intervals of confidence, what the solution predicts, and
+        the noise that it leaves.
     """
-    count = len(free) + 2 * len(trials)  # where each trial starts, and how fast, besides
-    weights = [1.0 / (_FIRST_NOISE * trial.spread) for trial in trials]
+    trials, count = problem.trials, problem.count
+    noises = [white(1.0 / (_FIRST_NOISE * trial.spread), len(trial.time)) for trial in trials]
+    missed = [np.zeros(len(trial.time)) for trial in trials]
 
     def residuals(points: _Values) -> _Values:
-        joints = [joint_at(start, free, point[: len(free)]) for point in points.T]
         parts = [
-            weight * (trial.predict(joints, offset) - trial.measured)
-            for trial, weight, offset in zip(
-                trials, weights, _offsets(points, len(free)), strict=True
+            noise.whiten(predicted + more - trial.measured)
+            for trial, noise, more, predicted in zip(
+                trials, noises, missed, problem.predictions(points), strict=True
             )
         ]
         return np.ascontiguousarray(np.concatenate(parts, axis=1).T)
@@ -303,19 +296,35 @@ def _solve(
     for stage in range(_ROUNDS):
         done = stage / _ROUNDS
         report = (lambda share, d=done: progress(d + share / _ROUNDS)) if progress else None
-        solution = solve(residuals, count, report, start=point)
+        solution = solve(
+            residuals,
+            count,
+            report,
+            start=point,
+            difference=_DIFFERENCE,
+            tolerance=_SETTLED,
+            stiffest=_STIFFEST,
+        )
         point = solution.deviations
-        joint = joint_at(start, free, point[: len(free)])
-        found = [
-            trial.weight(trial.predict([joint], offset)[0])
-            for trial, offset in zip(trials, _offsets(point, len(free)), strict=True)
+        known = problem.known(point)
+        predicted = [
+            values[0] + more
+            for values, (more, _) in zip(problem.predictions(point[:, None]), known, strict=True)
         ]
-        if np.allclose(found, weights, rtol=0.02) or stage == _ROUNDS - 1:
+        found = [
+            noise_of(values - trial.measured, errors, count / len(trials), trial.spread)
+            for trial, values, (_, errors) in zip(trials, predicted, known, strict=True)
+        ]
+        same = all(
+            _alike(new, old) and new.scale * np.linalg.norm(more - before) < _OFF
+            for new, old, (more, _), before in zip(found, noises, known, missed, strict=True)
+        )
+        if same or stage == _ROUNDS - 1:
             break
-        weights = found
-    return solution, intervals(residuals, solution, len(free))
+        noises, missed = found, [more for more, _ in known]
+    solution = over_uncertainty(residuals, solution)
+    return solution, intervals(residuals, solution, problem.wanted), predicted, found
 
 
-def _offsets(points: _Values, free: int) -> _Values:
-    """Start of each trial, in deviations: angle and velocity at K points, (trials, 2, K)."""
-    return points[free:].reshape(-1, 2, points[0].size)
+def _alike(new: Noise, old: Noise) -> bool:
+    return new.basis.shape == old.basis.shape and abs(new.scale / old.scale - 1) < _SAME

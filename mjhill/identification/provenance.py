@@ -85,8 +85,14 @@ def header(results: Sequence[Identified], parameters: str | Path | None) -> str:
                 f"    {len(one)} rows, {item.quantity} predicted, "
                 f"{100 * item.explained:.2f} % of its variance explained"
             )
-            lines += [f"    {note}" for note in one.notes]
+            lines.append(f"    inputs between rows: {item.inputs}")
+            lines += [f"    {note}" for note in item.notes]
         lines.append(f"  fitted: {', '.join(one.name for one in result.estimates)}")
+        if late := result.delay:
+            lines.append(
+                f"  delay of the excitations, not part of the joint: {late.value:.4g} s, "
+                f"95 % interval {late.low:.4g} to {late.high:.4g}"
+            )
         unknown = [one.name for one in result.estimates if one.informed < INFORMED]
         if unknown:
             lines.append(

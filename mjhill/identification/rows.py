@@ -223,7 +223,7 @@ def estimate_rows(result: Identified) -> list[dict[str, Any]]:
             "from the data [%]": 100 * item.informed,
             "at": "bound" if item.at_bound else "",
         }
-        for item in result.estimates
+        for item in result.all_estimates
     ]
 
 
@@ -237,10 +237,11 @@ def prediction_rows(predictions: Sequence[Prediction]) -> list[dict[str, Any]]:
                 "measurement": item.measurement.source,
                 "samples": len(item.measurement),
                 "predicted": item.quantity,
+                "inputs": item.inputs,
                 "rms error": degrees(item.error) if angle else item.error,
                 "unit": "°" if angle else "N·m",
                 "variance explained [%]": 100 * item.explained,
-                "notes": list(item.measurement.notes),
+                "notes": list(item.notes),
             }
         )
     return rows

@@ -20,7 +20,7 @@ from mjhill.muscles import steady_states
 CONTROL_AND_TORQUE = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 """What a rollout reads for each step: the excitation of every muscle, then the joint's torque."""
 
-_LOCKED = 1e12  # times the inertia of a joint that is to stay where it is
+_CLAMP = 1e15  # [kg·m²]; torques of a joint are lost in the rounding of what drives it
 
 _Values = NDArray[np.float64]
 
@@ -41,15 +41,13 @@ class Rigs:
         Args:
             joints: The joints.
             timestep: Length of a step [s].
-            locked: Whether the joints stay where they start: all contractions are isometric.
+            locked: Whether muscles cannot move the joints: each stays where it starts, unless
+                a torque moves its armature.
         """
         self.joints, self.timestep = tuple(joints), timestep
         self._muscles = len(joints[0].muscles)
         with installed():  # also while the batch is made: none can run with Python callbacks
-            self._batch = _simulations(joints, timestep)
-        if locked:
-            self._batch.expand("body_inertia")[:, 1] *= _LOCKED
-            self._batch.set_const()
+            self._batch = _simulations(joints, timestep, _CLAMP if locked else 0.0)
 
     def run(
         self,
@@ -143,66 +141,54 @@ def joint_angles(
 def driving_torques(
     joints: Sequence[Joint],
     *,
-    path: _Values,
+    path: ArrayLike,
     before: ArrayLike = 0.0,
     excitation: ArrayLike,
     timestep: float = 1e-3,
 ) -> _Values:
     """External torque [N·m] that moves each joint along a path, shape (N, T).
 
-    The path is prescribed, as by a rigid clamp. The torque balances the joint's inertia, passive
-    torque and muscles.
+    The path is prescribed, as by a rigid clamp: an armature so heavy that only the torque on it
+    moves the joint, at the path's velocities. What is returned is the torque that balances the
+    joint's own inertia, passive torque and muscles.
 
     Args:
         joints: N joints, as in ``joint_angles``.
-        path: Angle at every step [rad], shape (T,).
+        path: Angle at every step [rad], shape (T,), or (N, T) for a path each.
         before: As in ``joint_angles``.
-        excitation: Excitation of each muscle over each step [-], shape (T, muscles).
+        excitation: Excitation of each muscle over each step [-], broadcast to (N, T, muscles).
         timestep: Length of a step [s].
 
     Raises:
         UnmeasuredError: MuJoCo warned that a simulation went bad.
     """
     # the mean velocity over the last step, which is what the muscles have experienced
-    speed = np.diff(path, prepend=path[0]) / timestep
-    acceleration = np.gradient(np.gradient(path, timestep), timestep)
-    inertial = np.outer([joint.inertia for joint in joints], acceleration)
-    result = np.empty((len(joints), len(path)))
-    inputs = np.asarray(excitation)
-    with installed():
-        # one thread: a single step takes less time than waking other threads
-        batch = _batch(joints, path[0], 0.0, before, timestep, threads=1)
-        qpos, qvel, ctrl = batch.qpos, batch.qvel, batch.ctrl
-        passive, muscles = batch.bind("qfrc_passive"), batch.bind("qfrc_actuator")
-        for step in range(len(path)):
-            qpos[:, 0], qvel[:, 0], ctrl[:] = path[step], speed[step], inputs[step]
-            batch.step()
-            result[:, step] = inertial[:, step] - passive[:, 0] - muscles[:, 0]
-    check_batch(batch, joints[0])
-    return result
+    paths = np.atleast_2d(np.asarray(path, dtype=np.float64))
+    speed = np.diff(paths, prepend=paths[:, :1]) / timestep
+    acceleration = np.gradient(np.gradient(paths, timestep, axis=1), timestep, axis=1)
+    inertial = np.array([[joint.inertia] for joint in joints]) * acceleration
+    found = Rigs(joints, timestep=timestep, locked=True).run(
+        start=paths[:, 0],
+        before=before,
+        excitation=excitation,
+        torque=_CLAMP * np.diff(speed, append=speed[:, -1:]) / timestep,
+        steps=paths.shape[1],
+        record=("qfrc_passive", "qfrc_actuator"),
+    )
+    passive, active = (found[name][:, :, 0] for name in ("qfrc_passive", "qfrc_actuator"))
+    return np.asarray(inertial - passive - active)
 
 
-def _batch(
-    joints: Sequence[Joint],
-    start: ArrayLike,
-    velocity: ArrayLike,
-    before: ArrayLike,
-    timestep: float,
-    threads: int = 0,
+def _simulations(
+    joints: Sequence[Joint], timestep: float, armature: float = 0.0
 ) -> mujoco.batch.Batch:
-    """One simulation for each joint, muscles steady at the start; 0 threads means one a core."""
-    batch = _simulations(joints, timestep, threads)
-    _start(batch, joints, start, velocity, before)
-    return batch
-
-
-def _simulations(joints: Sequence[Joint], timestep: float, threads: int = 0) -> mujoco.batch.Batch:
     spec = joint_spec(joints[0])
     spec.option.timestep = timestep
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT  # the model has none
+    spec.joints[0].armature = armature
     with without_python_callbacks():
         model = spec.compile()
-    batch = mujoco.batch.Batch(model, nsim=len(joints), nthread=threads)
+    batch = mujoco.batch.Batch(model, nsim=len(joints))
     _expand(batch, joints)
     return batch
 
