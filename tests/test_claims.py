@@ -18,7 +18,7 @@ CLAIMS = {
     "free_pulse": ["Superposition does not hold", "does not halve the times"],
     "neural_sinusoid": ["only below about 2 to 5 Hz", "depends on the amplitude"],
     "isovelocity": [
-        "differ from the contractile element's own",
+        "depend on the initial condition",
         "series element is the main cause",
     ],
     "isotonic": ["can be approximated once the dynamics of the limb are subtracted"],

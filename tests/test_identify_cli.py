@@ -10,7 +10,7 @@ from mjhill.cli import main
 from mjhill.joints.reader import parameter_file, read_joints
 from mjhill.lab.rig import at_rest, build_rig, record_run
 
-FILES = ["hip.png", "identify.json", "joints.toml", "report.md"]
+FILES = ["facts.png", "hip.png", "identify.json", "joints.toml", "report.md"]
 
 
 def identify(*arguments):
@@ -46,7 +46,7 @@ def test_a_joint_is_fitted_to_the_literature_and_written(tmp_path):
     result = identify("hip", "-o", tmp_path / "out")
     assert result.exit_code == 0, result.stderr
     assert names(tmp_path / "out") == FILES
-    for title in ("Passive torques and ranges of motion", "Parameters"):
+    for title in ("Facts counted", "Joint hip", "Parameters"):
         assert title in result.stdout
     for name in FILES:
         assert name in result.stdout

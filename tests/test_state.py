@@ -71,7 +71,9 @@ def test_equilibrated_muscles_stay_while_the_joint_is_held(pair):
         mujoco.mj_forward(pair, data)
     np.testing.assert_allclose(data.act_dot, 0, atol=1e-9)
     muscle = mjhill.read_muscle(pair, "elbow_flexor")
-    share = np.exp(-(((-1.3 - muscle.optimal_length) / muscle.width_long) ** 2))
+    beyond = -1.3 - muscle.optimal_length
+    width = muscle.width_long if beyond > 0 else muscle.width_short
+    share = np.exp(-((beyond / width) ** 2))
     assert -data.actuator_force[0] == pytest.approx(0.5 * share * muscle.max_isometric_force)
 
 
