@@ -39,8 +39,9 @@ def test_a_fit_to_the_literature_can_be_printed_and_written(hip, tmp_path):
     assert [row["parameter"] for row in report["Parameters"]] == [one.name for one in hip.free]
     written = read_joints(files["parameters"])["hip"]
     assert written.stiffness == pytest.approx(hip.joint.stiffness, rel=5e-4)  # four digits
-    for title in report:
-        assert f"## {title}" in files["page"].read_text(encoding="utf-8")
+    page = files["page"].read_text(encoding="utf-8")
+    for title, rows in report.items():  # the hip is not in Table 2
+        assert (f"## {title}\n" in page) == bool(rows)
 
 
 @pytest.mark.parametrize("read", [False, True])
