@@ -144,8 +144,10 @@ def _make_file(path: Path) -> int:
 
 
 def _make_folder(path: Path) -> int:
-    path.mkdir()
-    return os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    while True:
+        path.mkdir()
+        with suppress(FileNotFoundError):  # a sweep was faster than the opening
+            return os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
 
 
 def _full(path: Path, error: OSError) -> OSError:

@@ -5,6 +5,7 @@ import os
 import resource
 import signal
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -113,6 +114,17 @@ def test_what_a_killed_process_left_is_swept_and_what_a_living_one_writes_is_not
         partial.write_text("next")
     assert content(tmp_path) == {"next.txt": b"next"}
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_folders_made_at_the_same_time_do_not_sweep_each_other_away(tmp_path):
+    def make_many(name):
+        for _ in range(200):
+            with partial_folder(tmp_path, name) as folder:
+                assert folder.is_dir()
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(make_many, "abcd"))
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_sweep_leaves_links_and_files_of_others_alone(tmp_path):
