@@ -26,6 +26,7 @@ from mjhill.muscles import MODELS as MODELS
 from mjhill.muscles import Muscle as Muscle
 from mjhill.muscles import muscle_model as muscle_model
 from mjhill.muscles import readings as readings
+from mjhill.muscles.dm import DistributionMoment as DistributionMoment
 from mjhill.muscles.equivalent import anatomical_muscle as anatomical_muscle
 from mjhill.muscles.equivalent import equivalent_muscle as equivalent_muscle
 from mjhill.muscles.hill import Hill as Hill

@@ -28,6 +28,7 @@ from mjhill.muscles.model import MuscleModel, arguments
 ROOT = Path(__file__).parent.parent
 INTEGRATORS = ("EULER", "IMPLICIT", "IMPLICITFAST", "DISCRETE", "RK4")
 NAMES = [model.name for model in mjhill.MODELS]
+MUSCLES = ("elbow_flexor", "elbow_extensor")
 MOVEMENT = {
     "elbow_flexor": mjhill.pulse(0.6, 0.05, 0.2) + 0.05,
     "elbow_extensor": mjhill.pulse(0.3, 0.2, 0.2) + 0.05,
@@ -64,9 +65,44 @@ def test_both_back_ends_agree(name, integrator):
     np.testing.assert_allclose(states[0], states[1], rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize(("integrator", "most"), [("IMPLICITFAST", 3e-3), ("RK4", 1e-4)])
-@pytest.mark.parametrize("name", NAMES)
+STAGED = [model.name for model in mjhill.MODELS if model.staged]
+# bonds that are stretched too far let go within a millisecond: forces differ much for a moment, so
+# root mean squares count
+AVALANCHES = {"dm": 1e-3}
+
+
+@pytest.mark.parametrize(
+    ("name", "integrator", "most"),
+    [(name, "IMPLICITFAST", 3e-3) for name in NAMES if name not in AVALANCHES]
+    + [(name, "RK4", 1e-4) for name in STAGED],
+)
 def test_a_run_follows_the_reference(name, integrator, most):
+    run, exact = run_and_reference(name, integrator)
+    for what in ("elbow.angle", "elbow_flexor.force", "elbow_flexor.a"):
+        error = np.abs(run[what] - exact[what]).max() / np.ptp(exact[what])
+        # force is steeper than angle: it has the lag of a step
+        assert error < (most if what != "elbow_flexor.force" else 6 * most), what
+    assert set(exact.series) <= set(run.series) | {"elbow.applied"}
+
+
+@pytest.mark.parametrize(("name", "most"), AVALANCHES.items())
+def test_a_run_of_bonds_follows_the_reference(name, most):
+    run, exact = run_and_reference(name, "IMPLICITFAST")
+    for what in ("elbow.angle", "elbow_flexor.force", "elbow_flexor.a"):
+        error = np.sqrt(np.square(run[what] - exact[what]).mean()) / np.ptp(exact[what])
+        assert error < (most if what != "elbow_flexor.force" else 12 * most), what
+    assert set(exact.series) <= set(run.series) | {"elbow.applied"}
+
+
+@pytest.mark.parametrize("name", [model.name for model in mjhill.MODELS if not model.staged])
+def test_a_model_that_cannot_follow_rk4_is_refused_under_it(name):
+    model = mjhill.load("elbow", muscle=name)
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    with pytest.raises(ValueError, match=f"'elbow_flexor' is of the model '{name}', which RK4"):
+        mjhill.check_model(model)
+
+
+def run_and_reference(name, integrator):
     joint = mjhill.JOINTS["elbow"].with_muscles(name)
     model = joint_spec(joint).compile()
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
@@ -75,12 +111,7 @@ def test_a_run_follows_the_reference(name, integrator, most):
     with mjhill.installed():
         mjhill.equilibrate(model, data)
         run = mjhill.record(model, data, duration=0.6, excitation=MOVEMENT)
-    exact = mjhill.reference.simulate(joint, MOVEMENT, duration=0.6)
-    for what in ("elbow.angle", "elbow_flexor.force", "elbow_flexor.a"):
-        error = np.abs(run[what] - exact[what]).max() / np.ptp(exact[what])
-        # force is steeper than angle: it has the lag of a step
-        assert error < (most if what != "elbow_flexor.force" else 6 * most), what
-    assert set(exact.series) <= set(run.series) | {"elbow.applied"}
+    return run, mjhill.reference.simulate(joint, MOVEMENT, duration=0.6)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -90,7 +121,8 @@ def test_energy_is_accounted_for(name):
         run = mjhill.record(model, mjhill.at_home(model), duration=0.6, excitation=MOVEMENT)
     balance = mjhill.energy(run)
     assert balance.gap < 0.01
-    assert balance.viscosity["elbow_flexor"][-1] > 0
+    if name in ("hill", "hill-rigid"):  # bonds lose energy where they break
+        assert balance.viscosity["elbow_flexor"][-1] > 0
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -150,8 +182,11 @@ def test_at_rest_the_force_is_that_of_hill(name):
                     mjhill.equilibrate(model, data)
                     mujoco.mj_forward(model, data)
                     forces.setdefault((angle, u), []).append(data.actuator_force.copy())
+    # the moments' distribution is taken to be Gaussian, which is not quite so
+    off = {"dm": 1e-3}.get(name, 1e-12)
+    peaks = [mjhill.JOINTS["elbow"].muscles[m].max_isometric_force for m in MUSCLES]
     for pair in forces.values():
-        np.testing.assert_allclose(pair[0], pair[-1], rtol=1e-9)
+        assert (np.abs(pair[0] - pair[-1]) <= off * np.array(peaks)).all()
 
 
 def test_a_rigid_muscle_has_the_force_of_its_contractile_element():
@@ -226,7 +261,7 @@ def _findings(model):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("elbow", "hil"), "unknown muscle model 'hil'; there are: hill, hill-rigid"),
+        (("elbow", "hil"), "unknown muscle model 'hil'; there are: hill, hill-rigid, "),
         (("elbow.mjb", "hill-rigid"), "an .mjb cannot change its muscles"),
     ],
 )
@@ -253,7 +288,9 @@ def test_a_muscle_of_no_model_is_refused():
     with pytest.raises(TypeError, match=r"make one of a model, such as mjhill.Hill"):
         mjhill.Muscle(max_isometric_force=1.0)
     spec = joint_spec(mjhill.JOINTS["elbow"])
-    with pytest.raises(TypeError, match=r"must be one of mjhill.Hill, mjhill.HillRigid, got dict"):
+    with pytest.raises(
+        TypeError, match=r"must be one of mjhill.Hill, mjhill.HillRigid, .*, got dict"
+    ):
         mjhill.add_muscle(spec, name="x", muscle={}, joint="elbow")
 
 
@@ -341,7 +378,7 @@ def test_a_new_model_is_a_file_and_a_line(tmp_path):
     (example,) = re.findall(r"```python file\n(.*?)```", page, re.DOTALL)
     (folder / "direct.py").write_text(example)
     registry, line = folder / "__init__.py", "    hill_rigid.MODEL,\n"
-    text = registry.read_text().replace("import hill,", "import cascade, direct, hill,")
+    text = registry.read_text().replace("import dm,", "import cascade, direct, dm,")
     registry.write_text(text.replace(line, f"{line}    cascade.MODEL,\n    direct.MODEL,\n"))
     where = {"PYTHONPATH": str(tmp_path), "MJHILL_CACHE_DIR": str(tmp_path / "cache")}
 
@@ -407,4 +444,4 @@ def test_commands_take_a_muscle_model(tmp_path):
     for name in ("run", "video", "compare", "info"):
         refused = command(name, "elbow", "--muscle", "hil")
         assert refused.exit_code == 2
-        assert "unknown muscle model 'hil'; there are: hill, hill-rigid" in refused.stderr
+        assert "unknown muscle model 'hil'; there are: hill, hill-rigid, " in refused.stderr

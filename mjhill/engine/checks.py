@@ -76,8 +76,8 @@ def check_model(model: mujoco.MjModel) -> tuple[Finding, ...]:
 
     Raises:
         ValueError: An actuator is half a muscle or has no gear, a parameter is outside its
-            bounds, a passive elasticity is incomplete or on a joint that cannot have one, or
-            the timestep is not positive.
+            bounds, a muscle model cannot follow RK4, a passive elasticity is incomplete or on a
+            joint that cannot have one, or the timestep is not positive.
 
     Warns:
         RuntimeWarning: A finding is severe.
@@ -93,6 +93,7 @@ def check_model(model: mujoco.MjModel) -> tuple[Finding, ...]:
         read_muscles(model)  # says which
     _check_gears(model, muscles, names)
     _check_elasticities(model)
+    _check_stages(model, groups, names)
     timestep = float(model.opt.timestep)
     if not (math.isfinite(timestep) and timestep > 0):
         raise ValueError(f"timestep must be positive, got {timestep} s; set model.opt.timestep")
@@ -174,6 +175,18 @@ def _in_bounds(group: Group) -> bool:
         above = values >= quantity.low if quantity.low_allowed else values > quantity.low
         good &= above & (values <= quantity.high)  # not so for NaN
     return bool(good.all())
+
+
+def _check_stages(model: mujoco.MjModel, groups: list[Group], names: list[str]) -> None:
+    if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:
+        return
+    for group in groups:
+        if not group.model.staged:
+            raise ValueError(
+                f"muscle {names[int(group.actuators[0])]!r} is of the model {group.model.name!r}, "
+                "which RK4 cannot follow; set model.opt.integrator to implicitfast, implicit, "
+                "Euler or discrete"
+            )
 
 
 def _check_gears(model: mujoco.MjModel, muscles: list[int], names: list[str]) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 from mjhill.elements import passive_torque
 from mjhill.muscles import MODELS, MuscleModel
 
-ALLOWED = ("exp", "log", "sqrt")  # functions of ``math`` that equations may call
+ALLOWED = ("exp", "log", "sqrt", "erf")  # functions of ``math`` that equations may call
 
 
 def compiled_functions(models: Iterable[MuscleModel] = MODELS) -> list[Callable[..., Any]]:

@@ -219,6 +219,12 @@ def addresses(model: mujoco.MjModel) -> Iterator[tuple[str, Address]]:
         yield names[actuator], _address(model, actuator)
 
 
+def muscle_lengths(model: mujoco.MjModel, data: mujoco.MjData) -> Iterator[tuple[str, float]]:
+    """Name of each muscle and its length less that at ``qpos0``; needs ``mj_fwdPosition``."""
+    for name, at in addresses(model):
+        yield name, float(data.actuator_length[at.out] - model.actuator_length0[at.out])
+
+
 def _address(model: mujoco.MjModel, actuator: int) -> Address:
     return Address(
         actuator,

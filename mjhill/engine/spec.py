@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import mujoco
 
-from mjhill.engine.equilibrium import equilibrate
+from mjhill.engine.equilibrium import at_home, equilibrate
 from mjhill.engine.layout import (
     NUSER_JNT,
     actuator_names,
+    muscle_lengths,
     parameter_rows,
     passive_row,
     read_muscles,
 )
 from mjhill.joints.joint import Joint, Passive
 from mjhill.joints.system import Coordinate, System
-from mjhill.muscles import Muscle, convert, model_of
+from mjhill.muscles import Muscle, OperatingPoint, convert, model_of
 
 
 def joint_spec(joint: Joint) -> mujoco.MjSpec:
@@ -160,16 +161,19 @@ def add_passive(spec: mujoco.MjSpec, *, joint: str, passive: Passive) -> None:
 def with_muscles(spec: mujoco.MjSpec, name: str) -> mujoco.MjSpec:
     """A copy of a model with all its muscles as those of another muscle model.
 
-    Poses of its keys stay; there the muscles are steady.
+    Poses of its keys stay; there the muscles are steady. Linear elements are made about the home
+    pose; see ``OperatingPoint``.
 
     Raises:
         ValueError: There is no muscle model of this name, or a muscle cannot be made one of it.
     """
     before, changed = spec.copy().compile(), spec.copy()
     names, muscles = actuator_names(before), read_muscles(before)
+    lengths = dict(muscle_lengths(before, at_home(before)))
     for actuator, of in zip(changed.actuators, names, strict=True):
         if of in muscles:
-            set_muscle(actuator, convert(muscles[of], name))
+            at = OperatingPoint(length=lengths[of])
+            set_muscle(actuator, convert(muscles[of], name, at))
     for key in changed.keys:
         key.act = []
     after = changed.copy().compile()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mjhill.frozen import FrozenDict
-from mjhill.muscles import Muscle, convert, model_of
+from mjhill.muscles import Muscle, OperatingPoint, convert, model_of
 from mjhill.muscles.hill import Hill
 from mjhill.muscles.model import Values
 from mjhill.muscles.parts import exponential_area
@@ -124,8 +124,13 @@ class Joint:
     def with_muscles(self, model: str) -> Joint:
         """The joint with muscles of another model, such as ``hill-rigid``.
 
+        Linear elements are made about the home angle; see ``OperatingPoint``.
+
         Raises:
             ValueError: There is no model of this name, or a muscle cannot be made one of it.
         """
-        muscles = {name: convert(muscle, model) for name, muscle in self.muscles.items()}
+        muscles = {
+            name: convert(muscle, model, OperatingPoint(length=self.gears[name] * self.home_angle))
+            for name, muscle in self.muscles.items()
+        }
         return replace(self, muscles=muscles)

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from mjhill.muscles import hill, hill_rigid
+from mjhill.muscles import dm, hill, hill_rigid
 from mjhill.muscles.model import Muscle as Muscle
 from mjhill.muscles.model import MuscleModel as MuscleModel
+from mjhill.muscles.model import OperatingPoint as OperatingPoint
 from mjhill.muscles.parts import Contractile
 
 MODELS: tuple[MuscleModel, ...] = (
     hill.MODEL,
     hill_rigid.MODEL,
+    dm.MODEL,
 )
 
 BY_TAG = {model.tag: model for model in MODELS}
 TAGS = (198700.0, 198800.0)  # where those of mjhill are
 
+_HOME = OperatingPoint()
 _BY_NAME = {model.name: model for model in MODELS}
 _BY_PARAMETERS = {model.parameters: model for model in MODELS}
 
@@ -91,8 +94,8 @@ def contractile_of(muscle: Muscle) -> Contractile:
     return muscle
 
 
-def convert(muscle: Muscle, name: str) -> Muscle:
-    """A muscle as one of another model.
+def convert(muscle: Muscle, name: str, at: OperatingPoint = _HOME) -> Muscle:
+    """A muscle as one of another model, its linear elements, if any, about an operating point.
 
     Raises:
         ValueError: There is no model of this name, or the muscle is not of the model ``hill``,
@@ -106,4 +109,4 @@ def convert(muscle: Muscle, name: str) -> Muscle:
             f"a muscle of the model {model_of(muscle).name!r} cannot be made one of {name!r}; "
             "start from mjhill.Hill"
         )
-    return model.from_hill(muscle)
+    return model.from_hill(muscle, at)

@@ -25,6 +25,7 @@ from mjhill.muscles.parts import (
     ACTIVATION,
     EXCITATION,
     Contractile,
+    SeriesElement,
     active_share,
     exponential_area,
     lengthening,
@@ -34,11 +35,10 @@ from mjhill.muscles.parts import (
     viscous_loss,
 )
 from mjhill.muscles.scheme import activation_rates, advance_stretch, staged_stretch
-from mjhill.quantity import LENGTH, quantity
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hill(Contractile):
+class Hill(SeriesElement, Contractile):
     """One muscle: neural excitation, activation, contractile and series element.
 
     On a joint, force is a torque [N·m] and length an angle [rad]; on a tendon, force [N] and
@@ -48,21 +48,6 @@ class Hill(Contractile):
     Attributes:
         sources: Where each value comes from, by parameter name.
     """
-
-    series_stretch: float = quantity(
-        # a nanometre; where it is shorter, products of its stiffness overflow
-        "x_max", LENGTH, "stretch of the series element at F_max (eq. 7)",
-        (1e-9, 100), low_allowed=True, array="gainprm",
-    )  # fmt: skip
-    series_shape: float = quantity(
-        # above 10 stiffness rises by four powers of ten within the working range
-        "S", "-", "shape of the exponential series element (eq. 7)",
-        (0.01, 10), default=3.0, low_allowed=True, array="gainprm",
-    )  # fmt: skip
-    series_limit: float = quantity(
-        "r", "-", "stretch, in units of x_max, past which the series element goes on straight",
-        (1, 10), default=2.0, low_allowed=True, array="gainprm",
-    )  # fmt: skip
 
 
 def rates(
@@ -356,9 +341,13 @@ def fault(
 
 def series(track: Track) -> Series:
     """What a recording shows of a muscle; docs/energy.md has the equations."""
+    return elastic_series(track, _stretches(track))
+
+
+def elastic_series(track: Track, stretched: Values) -> Series:
+    """What a recording shows of a muscle with this series element, from its stretch [rad or m]."""
     muscle, time = track.muscle, track.time
     states, s_rate = track.states, track.state_rates["s"]
-    stretched = _stretches(track)
     shortened = stretched - track.length
     velocity = np.concatenate(([-s_rate[0]], np.diff(shortened) / np.diff(time)))
     yield "n", "-", states["n"]

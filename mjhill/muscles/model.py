@@ -134,6 +134,19 @@ class Track:
     power: Callable[[Values, float], Values]
 
 
+@dataclass(frozen=True)
+class OperatingPoint:
+    """A muscle at rest, about which a linear element does as the one whose place it takes.
+
+    Attributes:
+        excitation: Steady excitation [-].
+        length: Its length, less that at ``qpos0`` [rad or m].
+    """
+
+    excitation: float = 0.5
+    length: float = 0.0
+
+
 Series = Iterator[tuple[str, str, Values]]  # quantity, kind of unit, values
 
 
@@ -151,10 +164,10 @@ def units_of(turns: bool) -> dict[str, str]:
     }
 
 
-def same_parameters(kind: type[Muscle]) -> Callable[[Muscle], Muscle]:
+def same_parameters(kind: type[Muscle]) -> Callable[[Muscle, OperatingPoint], Muscle]:
     """A function that makes a muscle of ``kind`` from another with the parameters of its names."""
 
-    def convert(muscle: Muscle) -> Muscle:
+    def convert(muscle: Muscle, _at: OperatingPoint) -> Muscle:
         names = {item.name for item in fields(kind)} & {item.name for item in fields(muscle)}
         return kind(**{name: getattr(muscle, name) for name in names})
 
@@ -206,11 +219,13 @@ class MuscleModel:
             lengthening rate adds to that.
         compliance: Change of length by which its force goes from 0 to the largest.
         max_velocity: Largest shortening velocity of its contractile element, if it has one.
-        from_hill: A muscle of this model that does as a given ``Hill`` muscle, isometrically.
+        from_hill: A muscle of this model that does as a given ``Hill`` muscle, isometrically; its
+            linear elements, if it has any, about an operating point.
         time_constants: Time constants [s] of its states by name of the parameter; RK4 cannot follow
             one that is shorter than the timestep.
         fault: What is impossible about states and ``length``, in words, or None.
         viscous_loss: Energy lost inside [J], from what ``series`` gave; see ``nothing_lost``.
+        staged: Whether it can follow the stages of RK4; ``check_model`` refuses one that cannot.
         sources: Where its equations come from.
     """
 
@@ -230,13 +245,14 @@ class MuscleModel:
     lengthening: Equation
     compliance: Equation
     max_velocity: Equation | None
-    from_hill: Callable[[Any], Muscle]
+    from_hill: Callable[[Any, OperatingPoint], Muscle]
     sources: str
     activation: str = "a"
     bins: str = ""
     time_constants: Equation = no_time_constants
     fault: Equation = no_fault
     viscous_loss: Callable[..., Values] = nothing_lost
+    staged: bool = True
 
     def __post_init__(self) -> None:
         """Check that every equation asks only for what exists.

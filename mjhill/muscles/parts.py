@@ -49,8 +49,8 @@ class Activated(Muscle):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contractile(Activated):
-    """A muscle with Hill's contractile element: force over length (ATA) and velocity (CE)."""
+class LengthDependent(Activated):
+    """A muscle whose active force depends on its length (ATA), sect. 3.2."""
 
     optimal_length: float = quantity(
         "L_opt", LENGTH, "length at which active force is largest",
@@ -64,6 +64,12 @@ class Contractile(Activated):
         "w_long", LENGTH, "Gaussian width of active force above the optimum",
         (0, 1000), array="gainprm",
     )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contractile(LengthDependent):
+    """A muscle with Hill's contractile element: force over velocity (CE), sect. 2.2 and 3.2."""
+
     max_velocity: float = quantity(
         # the slowest muscles shorten by a tenth of their length in a second; a muscle that
         # is far slower than its joint holds it like a rope, at any force
@@ -90,6 +96,26 @@ class Contractile(Activated):
     velocity_activation: float = quantity(
         "κ", "-", "share of V_max that scales with active state: V_max (1 - κ + κ a g)",
         (0, 1), default=0.0, low_allowed=True, array="biasprm",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeriesElement:
+    """An exponential series element (SE), eqs. 6-7, beside what else a muscle has."""
+
+    series_stretch: float = quantity(
+        # a nanometre; where it is shorter, products of its stiffness overflow
+        "x_max", LENGTH, "stretch of the series element at F_max (eq. 7)",
+        (1e-9, 100), low_allowed=True, array="gainprm",
+    )  # fmt: skip
+    series_shape: float = quantity(
+        # above 10 stiffness rises by four powers of ten within the working range
+        "S", "-", "shape of the exponential series element (eq. 7)",
+        (0.01, 10), default=3.0, low_allowed=True, array="gainprm",
+    )  # fmt: skip
+    series_limit: float = quantity(
+        "r", "-", "stretch, in units of x_max, past which the series element goes on straight",
+        (1, 10), default=2.0, low_allowed=True, array="gainprm",
     )  # fmt: skip
 
 
