@@ -69,11 +69,13 @@ STAGED = [model.name for model in mjhill.MODELS if model.staged]
 # bonds that are stretched too far let go within a millisecond: forces differ much for a moment, so
 # root mean squares count
 AVALANCHES = {"dm": 1e-3}
+# with an array of states, whose reference takes minutes; they have tests of their own
+ARRAYS = [model.name for model in mjhill.MODELS if model.bins]
 
 
 @pytest.mark.parametrize(
     ("name", "integrator", "most"),
-    [(name, "IMPLICITFAST", 3e-3) for name in NAMES if name not in AVALANCHES]
+    [(name, "IMPLICITFAST", 3e-3) for name in NAMES if name not in (*AVALANCHES, *ARRAYS)]
     + [(name, "RK4", 1e-4) for name in STAGED],
 )
 def test_a_run_follows_the_reference(name, integrator, most):
@@ -182,8 +184,8 @@ def test_at_rest_the_force_is_that_of_hill(name):
                     mjhill.equilibrate(model, data)
                     mujoco.mj_forward(model, data)
                     forces.setdefault((angle, u), []).append(data.actuator_force.copy())
-    # the moments' distribution is taken to be Gaussian, which is not quite so
-    off = {"dm": 1e-3}.get(name, 1e-12)
+    # bonds are in bins, or their distribution is taken to be Gaussian, which is not quite so
+    off = {"dm": 1e-3, "huxley": 1e-3}.get(name, 1e-12)
     peaks = [mjhill.JOINTS["elbow"].muscles[m].max_isometric_force for m in MUSCLES]
     for pair in forces.values():
         assert (np.abs(pair[0] - pair[-1]) <= off * np.array(peaks)).all()
@@ -412,7 +414,7 @@ def test_a_new_model_is_a_file_and_a_line(tmp_path):
 
 
 def test_equations_of_scalar_models_take_and_give_plain_floats():
-    for model in mjhill.MODELS:
+    for model in (model for model in mjhill.MODELS if not model.bins):
         assert not {"states", "state_rates"} & set(arguments(model.rates))
 
 

@@ -63,9 +63,9 @@ def equilibrate(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         steady = group.model.steady
         u = _excitations(model, data, group.actuators.tolist())
         rows = group.rows(steady, u=u, length=_lengths(model, data, group))
-        states = np.array([steady(*row) for row in rows])
-        first = model.actuator_actadr[group.actuators]
-        data.act[first[:, None] + np.arange(states.shape[1])] = states
+        for first, row in zip(model.actuator_actadr[group.actuators].tolist(), rows, strict=True):
+            states = steady(*row)
+            data.act[first : first + len(states)] = states
 
 
 def _lengths(model: mujoco.MjModel, data: mujoco.MjData, group: Group) -> list[float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mjhill.muscles import dm, hill, hill_rigid
+from mjhill.muscles import dm, hill, hill_rigid, huxley
 from mjhill.muscles.model import Muscle as Muscle
 from mjhill.muscles.model import MuscleModel as MuscleModel
 from mjhill.muscles.model import OperatingPoint as OperatingPoint
@@ -12,6 +12,7 @@ MODELS: tuple[MuscleModel, ...] = (
     hill.MODEL,
     hill_rigid.MODEL,
     dm.MODEL,
+    huxley.MODEL,
 )
 
 BY_TAG = {model.tag: model for model in MODELS}

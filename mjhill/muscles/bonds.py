@@ -46,9 +46,9 @@ REACH = 15.6e-9  # h [m] (Huxley 1957)
 SARCOMERE = 2.7e-6  # optimal length in humans [m] (Walker & Schrodt 1974)
 WIDTH = sqrt(0.45)  # of a fibre's force-length relation [fibre lengths] (Thelen 2003)
 RATES = (43.3, 10.0, 209.0)  # f1, g1, g2 [1/s] of frog muscle at 0 °C (Huxley 1957)
-# g3 beside these, an estimate: its form is that of Zahalak 1986. It is 2.3 f1 here, and 1.75 f1 in
-# the model of rat soleus of Lemaire et al. 2016. In Huxley's own model it is 0.
-STRETCHED_RATE = 100.0
+# g3, as a share of f1, of rat soleus (Lemaire et al. 2016, J. Exp. Biol. 219:977-987); its form is
+# that of Zahalak 1986. In Huxley's own model g3 is 0.
+STRETCHED_RATE = 1400.0 / 800.0 * RATES[0]
 
 
 @dataclass(frozen=True)

@@ -349,9 +349,10 @@ def _muscle_series(
     for k, state in enumerate(model.states):
         if state.share:
             columns[state.name] = "-", states[:, k]
-    order = ("u", *model.state_names, "length", "length_rate")
+    order = ("states", "u", *model.state_names, "length", "length_rate")
     named = states[:, : len(model.states)].T
-    given = list(zip(*(v.tolist() for v in (u, *named, lengths, length_rates)), strict=True))
+    numbers = (v.tolist() for v in (u, *named, lengths, length_rates))
+    given = list(zip(states, *numbers, strict=True))
     for quantity, (kind, equation) in model.readings.items():
         value = model.bound(equation, muscle, order)
         columns[quantity] = kind, np.array([value(*row) for row in given])
