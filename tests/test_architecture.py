@@ -21,6 +21,7 @@ ORDER = (
     "lab",
     "literature",
     "experiments",
+    "ladder",
     "identification",
     "comparison",
     "report",

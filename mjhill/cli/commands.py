@@ -12,6 +12,7 @@ import click
 from mjhill.cli.check import check
 from mjhill.cli.group import Group
 from mjhill.cli.identify import identify
+from mjhill.cli.ladder import ladder
 from mjhill.cli.printing import (
     json_option,
     print_json,
@@ -41,6 +42,7 @@ def main() -> None:
 
 main.add_command(check)
 main.add_command(identify)
+main.add_command(ladder)
 main.add_command(reproduce)
 main.add_command(view)
 
