@@ -1,4 +1,4 @@
-"""The ladder: models of muscle, each on the same joint in the same tasks, compared with ``hill``."""
+"""The ladder: models of muscle on the same joint in the same tasks, compared with ``hill``."""
 
 from mjhill.ladder.table import Cell, ladder
 from mjhill.ladder.tasks import RUNGS, TASKS, Task, rung
