@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -79,12 +79,17 @@ def _drive(joint: Joint, seconds: float, level: float, width: float | None = Non
     return excitation
 
 
+def _weightless(joint: Joint) -> Joint:
+    """Without inertia: its torque at the corners of a ramp would be most of the range."""
+    return replace(joint, inertia=1e-12)
+
+
 def _isometric(level: float, width: float | None) -> Callable[[Joint, Joint], _Values]:
     def run(joint: Joint, base: Joint) -> _Values:
         excitation = _drive(base, _LONG, level, width)
         path = np.full(excitation.shape[1], base.home_angle)
         torque = driving_torques(
-            [joint], path=path, excitation=excitation, timestep=timestep_of(base)
+            [_weightless(joint)], path=path, excitation=excitation, timestep=timestep_of(base)
         )
         return np.asarray(torque[0])
 
@@ -100,7 +105,11 @@ def _ramp(sign: float) -> Callable[[Joint, Joint], _Values]:
         course = np.clip((np.arange(2 * steps) - steps / 4) / steps, 0, 1)
         path = base.home_angle + shortening * _SPAN * (high - low) * course
         torque = driving_torques(
-            [joint], path=path, before=before, excitation=before, timestep=timestep_of(base)
+            [_weightless(joint)],
+            path=path,
+            before=before,
+            excitation=before,
+            timestep=timestep_of(base),
         )
         return np.asarray(torque[0])
 
