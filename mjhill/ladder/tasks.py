@@ -16,20 +16,8 @@ from mjhill.lab.rig import as_joint, timestep_of
 
 CONSTANT_VELOCITY = "hill, V_max constant"
 
-RUNGS = (
-    "hill",
-    CONSTANT_VELOCITY,
-    "hill-linear-cetv",
-    "hill-linear-se",
-    "hill-flat-ata",
-    "hill-linear-pe",
-    "hill-linear",
-    "hill-rigid",
-    "second-order",
-    "dm",
-    "huxley",
-)
-"""Every rung. One whose model is not registered is reported as "cannot", with the reason."""
+RUNGS = ("hill", CONSTANT_VELOCITY, "hill-rigid", "dm", "huxley")
+"""The models of the ladder; of ``hill, V_max constant`` the parameters were fitted anew."""
 
 _BURST, _LONG, _MOVE = 0.05, 1.0, 0.2  # [s]; estimates, ten times shorter in the eye
 _SPAN = 0.2  # of the range of motion that a prescribed movement covers; an estimate
