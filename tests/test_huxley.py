@@ -5,8 +5,10 @@ import dataclasses
 import mujoco
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import mjhill
+from mjhill.cli import main
 from mjhill.engine.spec import joint_spec
 from mjhill.muscles import bonds, steady_tension
 from mjhill.muscles.huxley import MODEL, positions
@@ -175,3 +177,23 @@ def test_a_share_that_cannot_be_is_refused():
         data.act[10] = 1.5
         with pytest.raises(ValueError, match="'elbow_flexor': its bin 6 must be in"):
             mjhill.record(model, data, duration=0.01)
+
+
+def test_a_model_is_loaded_with_as_many_bins_as_asked_for():
+    model = mjhill.load("elbow", muscle="huxley", bins=200)
+    assert model.na == 2 * 204
+    assert mjhill.read_muscle(model, "elbow_flexor").bins == 200
+    with pytest.raises(ValueError, match=r"bins = 60 needs a muscle model with bins, got 'dm'"):
+        mjhill.load("elbow", muscle="dm", bins=60)
+    with pytest.raises(ValueError, match="bins must be in"):
+        mjhill.load("elbow", muscle="huxley", bins=10)
+
+
+def test_a_command_runs_it_with_bins(tmp_path):
+    path = str(tmp_path / "run.csv")
+    arguments = ["run", "elbow", "--muscle", "huxley", "--duration", "0.05", "--output", path]
+    done = CliRunner().invoke(main, [*arguments, "--bins", "60"])
+    assert done.exit_code == 0, done.output
+    assert mjhill.Recording.load(path).muscles["elbow_flexor"].bins == 60
+    refused = CliRunner().invoke(main, [*arguments, "--bins", "20"])
+    assert refused.exit_code == 2

@@ -71,6 +71,9 @@ muscle_option = click.option(
     metavar="NAME",
     help="Muscle model in the place of hill, such as hill-rigid.",
 )
+bins_option = click.option(
+    "--bins", type=click.IntRange(min=1), help="Bins of the muscle model huxley; by default 100."
+)
 
 
 @main.command()
@@ -130,6 +133,7 @@ def info(model: str, mjcf: bool, muscle: str | None, as_json: bool) -> None:
 @click.argument("model")
 @_inputs_options
 @muscle_option
+@bins_option
 @click.option("--duration", "-d", default=4.0, show_default=True, help="Duration [s].")
 @click.option(
     "--output",
@@ -144,6 +148,7 @@ def run(
     excite: tuple[str, ...],
     torque: tuple[str, ...],
     muscle: str | None,
+    bins: int | None,
     duration: float,
     output: Path | None,
     plot: Path | None,
@@ -153,13 +158,14 @@ def run(
     files = {"recording": output or _OUT / f"run-{Path(model).stem}.csv"}
     if plot:
         files["plot"] = plot
-    _film(model, _parse(excite), _parse(torque), duration, files, as_json, muscle)
+    _film(model, _parse(excite), _parse(torque), duration, files, as_json, muscle, bins)
 
 
 @main.command()
 @click.argument("model")
 @_inputs_options
 @muscle_option
+@bins_option
 @click.option("--duration", "-d", default=4.0, show_default=True, help="Duration [s].")
 @click.option(
     "--output",
@@ -179,6 +185,7 @@ def video(
     excite: tuple[str, ...],
     torque: tuple[str, ...],
     muscle: str | None,
+    bins: int | None,
     duration: float,
     output: Path | None,
     as_json: bool,
@@ -187,7 +194,7 @@ def video(
     """Film MODEL, a joint's name or a path, without a screen."""
     _check_frames(duration, options["fps"], options["speed"])
     files = {"video": output or _OUT / f"video-{Path(model).stem}.mp4"}
-    _film(model, _parse(excite), _parse(torque), duration, files, as_json, muscle, **options)
+    _film(model, _parse(excite), _parse(torque), duration, files, as_json, muscle, bins, **options)
 
 
 @main.command()
@@ -344,6 +351,7 @@ def _film(
     files: dict[str, Path],
     as_json: bool,
     muscle: str | None = None,
+    bins: int | None = None,
     **video: Any,
 ) -> None:
     """Run a model from its home pose, write the ``files`` and print a summary."""
@@ -355,7 +363,7 @@ def _film(
         if path.suffix not in _SUFFIXES[kind]:
             wanted = " or ".join(_SUFFIXES[kind])
             raise ValueError(f"{kind} {str(path)!r} must end in {wanted}")
-    loaded = load(model, muscle)
+    loaded = load(model, muscle, bins)
     for path in files.values():
         if path.parent == _OUT:
             _OUT.mkdir(exist_ok=True)

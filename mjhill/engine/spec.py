@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import mujoco
 
 from mjhill.engine.equilibrium import at_home, equilibrate
@@ -158,22 +161,26 @@ def add_passive(spec: mujoco.MjSpec, *, joint: str, passive: Passive) -> None:
         spec.nuser_jnt = max(spec.nuser_jnt, NUSER_JNT)
 
 
-def with_muscles(spec: mujoco.MjSpec, name: str) -> mujoco.MjSpec:
+def with_muscles(spec: mujoco.MjSpec, name: str, bins: int | None = None) -> mujoco.MjSpec:
     """A copy of a model with all its muscles as those of another muscle model.
 
-    Poses of its keys stay; there the muscles are steady. Linear elements are made about the home
-    pose; see ``OperatingPoint``.
+    Poses of its keys stay; there the muscles are steady. A model with linear elements has them
+    about the home pose; see ``OperatingPoint``. ``bins`` is the number of bins, for a model that has them.
 
     Raises:
-        ValueError: There is no muscle model of this name, or a muscle cannot be made one of it.
+        ValueError: There is no muscle model of this name, a muscle cannot be made one of it, or
+            it cannot have so many bins.
     """
     before, changed = spec.copy().compile(), spec.copy()
     names, muscles = actuator_names(before), read_muscles(before)
     lengths = dict(muscle_lengths(before, at_home(before)))
     for actuator, of in zip(changed.actuators, names, strict=True):
         if of in muscles:
-            at = OperatingPoint(length=lengths[of])
-            set_muscle(actuator, convert(muscles[of], name, at))
+            muscle = convert(muscles[of], name, OperatingPoint(length=lengths[of]))
+            if bins is not None:
+                count: dict[str, Any] = {model_of(muscle).bins: bins}
+                muscle = replace(muscle, **count)
+            set_muscle(actuator, muscle)
     for key in changed.keys:
         key.act = []
     after = changed.copy().compile()

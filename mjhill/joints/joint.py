@@ -124,7 +124,7 @@ class Joint:
     def with_muscles(self, model: str) -> Joint:
         """The joint with muscles of another model, such as ``hill-rigid``.
 
-        Linear elements are made about the home angle; see ``OperatingPoint``.
+        A model with linear elements has them about the home angle; see ``OperatingPoint``.
 
         Raises:
             ValueError: There is no model of this name, or a muscle cannot be made one of it.

@@ -10,6 +10,7 @@ from mjhill.engine.checks import check_model
 from mjhill.engine.install import without_python_callbacks
 from mjhill.engine.spec import with_muscles
 from mjhill.joints.reader import JOINTS
+from mjhill.muscles import MODELS, muscle_model
 
 _PACKAGE = Path(__file__).parent.parent
 
@@ -27,7 +28,7 @@ def model_path(joint: str) -> Path:
     return folder / joint / "scene.xml"
 
 
-def load(model: str | Path, muscle: str | None = None) -> mujoco.MjModel:
+def load(model: str | Path, muscle: str | None = None, bins: int | None = None) -> mujoco.MjModel:
     """Load and check a model: the name of a joint that comes with mjhill, or an MJCF or MJB file.
 
     The joints that come with mjhill have no gravity, as the movements of the paper;
@@ -38,11 +39,19 @@ def load(model: str | Path, muscle: str | None = None) -> mujoco.MjModel:
         model: A joint's name, such as ``"elbow"``, or a path that ends in .xml or .mjb.
         muscle: Name of the muscle model that takes the place of ``hill`` in all muscles, such as
             ``"hill-rigid"``; without it they stay as they are in the file.
+        bins: Number of bins of muscles that have them, those of the model ``huxley``; by default
+            100.
 
     Raises:
         ValueError: There is no such joint, file or muscle model, MuJoCo cannot compile it, a
-            muscle in it is not in order (see ``check_model``), or ``muscle`` is given for an .mjb.
+            muscle in it is not in order (see ``check_model``), ``muscle`` is given for an .mjb,
+            or ``bins`` without a muscle model that has bins.
     """
+    if bins is not None and (muscle is None or not muscle_model(muscle).bins):
+        having = ", ".join(kind.name for kind in MODELS if kind.bins)
+        raise ValueError(
+            f"bins = {bins} needs a muscle model with bins, got {muscle!r}; there are: {having}"
+        )
     path = Path(model)
     if str(model) in JOINTS:
         path = model_path(str(model))
@@ -56,7 +65,7 @@ def load(model: str | Path, muscle: str | None = None) -> mujoco.MjModel:
         raise ValueError(f"{path}: an .mjb cannot change its muscles to {muscle!r}; load the .xml")
     with without_python_callbacks():
         if muscle is not None:
-            loaded = with_muscles(mujoco.MjSpec.from_file(str(path)), muscle).compile()
+            loaded = with_muscles(mujoco.MjSpec.from_file(str(path)), muscle, bins).compile()
         elif binary:
             loaded = mujoco.MjModel.from_binary_path(str(path))
         else:
