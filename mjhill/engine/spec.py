@@ -165,7 +165,8 @@ def with_muscles(spec: mujoco.MjSpec, name: str, bins: int | None = None) -> muj
     """A copy of a model with all its muscles as those of another muscle model.
 
     Poses of its keys stay; there the muscles are steady. A model with linear elements has them
-    about the home pose; see ``OperatingPoint``. ``bins`` is the number of bins, for a model that has them.
+    about the home pose; see ``OperatingPoint``. ``bins`` is the number of bins, for a model that
+    has them.
 
     Raises:
         ValueError: There is no muscle model of this name, a muscle cannot be made one of it, or
@@ -178,8 +179,8 @@ def with_muscles(spec: mujoco.MjSpec, name: str, bins: int | None = None) -> muj
         if of in muscles:
             muscle = convert(muscles[of], name, OperatingPoint(length=lengths[of]))
             if bins is not None:
-                count: dict[str, Any] = {model_of(muscle).bins: bins}
-                muscle = replace(muscle, **count)
+                given: dict[str, Any] = {model_of(muscle).bins: bins}
+                muscle = replace(muscle, **given)
             set_muscle(actuator, muscle)
     for key in changed.keys:
         key.act = []
