@@ -52,7 +52,8 @@ def test_muscles_are_drawn_from_the_whole_of_their_ranges():
             drawn_outcomes.draw(kind, number).model
         ).values()
     ]
-    assert {type(muscle) for muscle in drawn} == {model.parameters for model in mjhill.MODELS}
+    # no muscles of bonds: most would have rates out of bounds
+    assert {type(muscle) for muscle in drawn} == {Hill, mjhill.HillRigid}
     for name, quantity in quantities(Hill):
         values = [getattr(muscle, name) for muscle in drawn if isinstance(muscle, Hill)]
         assert max(values) == quantity.high, name
