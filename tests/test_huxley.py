@@ -71,7 +71,7 @@ def test_steady_shortening_has_the_force_of_the_closed_form(share):
 def test_the_isometric_force_does_not_depend_on_where_the_bins_lie(u):
     lengths = np.linspace(0.0, 5 * FLEXOR.bond_reach, 41)
     forces = [steady_tension(FLEXOR, u, length) / FULL for length in lengths.tolist()]
-    assert np.abs(np.array(forces) - u).max() < 0.001
+    assert np.abs(np.array(forces) - u).max() < 0.002
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_more_bins_and_shorter_steps_converge():
         return error / np.ptp(fine["elbow.angle"])
 
     assert off(100, 1e-3) < 0.01
-    assert off(200, 1e-3) < 0.5 * off(50, 5e-3)
+    assert off(200, 1e-3) < 0.5 * off(70, 5e-3)
 
 
 def test_bonds_that_break_when_stretched_limit_the_force_of_lengthening():
@@ -126,6 +126,15 @@ def test_bonds_that_break_when_stretched_limit_the_force_of_lengthening():
     assert grown[-1] > 3.0 * FULL
 
 
+@pytest.mark.parametrize("share", [0.5, 1.0])
+def test_a_fast_stretch_goes_on_at_a_steady_force(share):
+    """No bonds are left where the window ends, so none are lost there all at once."""
+    found, _ = stretched(FLEXOR, share * V_MAX, 0.4)
+    last = found[-100:] / FULL
+    assert np.ptp(last) < 0.15
+    assert last.mean() > 1.0
+
+
 def test_activation_can_scale_force_in_the_place_of_attachment():
     scaled = dataclasses.replace(FLEXOR, activation_scales_force=True)
     for u in (0.05, 0.4, 1.0):
@@ -137,10 +146,10 @@ def test_activation_can_scale_force_in_the_place_of_attachment():
 
 
 def test_bins_fill_the_window_once():
-    x, width = positions(0.123, 100, 3.5, 0.02)
+    x, width = positions(0.123, 100, 5.0, 0.02)
     assert np.allclose(np.diff(np.sort(x)), width)
     assert x.min() >= -1.5
-    assert x.max() < 3.5
+    assert x.max() < 5.0
 
 
 @pytest.mark.parametrize(
@@ -192,8 +201,8 @@ def test_a_model_is_loaded_with_as_many_bins_as_asked_for():
 def test_a_command_runs_it_with_bins(tmp_path):
     path = str(tmp_path / "run.csv")
     arguments = ["run", "elbow", "--muscle", "huxley", "--duration", "0.05", "--output", path]
-    done = CliRunner().invoke(main, [*arguments, "--bins", "60"])
+    done = CliRunner().invoke(main, [*arguments, "--bins", "70"])
     assert done.exit_code == 0, done.output
-    assert mjhill.Recording.load(path).muscles["elbow_flexor"].bins == 60
+    assert mjhill.Recording.load(path).muscles["elbow_flexor"].bins == 70
     refused = CliRunner().invoke(main, [*arguments, "--bins", "20"])
     assert refused.exit_code == 2

@@ -185,7 +185,7 @@ def test_at_rest_the_force_is_that_of_hill(name):
                     mujoco.mj_forward(model, data)
                     forces.setdefault((angle, u), []).append(data.actuator_force.copy())
     # bonds are in bins, or their distribution is taken to be Gaussian, which is not quite so
-    off = {"dm": 1e-3, "huxley": 1e-3}.get(name, 1e-12)
+    off = {"dm": 1e-3, "huxley": 2e-3}.get(name, 1e-12)
     peaks = [mjhill.JOINTS["elbow"].muscles[m].max_isometric_force for m in MUSCLES]
     for pair in forces.values():
         assert (np.abs(pair[0] - pair[-1]) <= off * np.array(peaks)).all()

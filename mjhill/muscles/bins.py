@@ -191,4 +191,24 @@ def advance_bins(
         if abs(whole - displacement) <= NEAR:
             break
         displacement = whole
+    break_outside(moved, first, s / bond_reach, whole, longest_bond)
     return whole
+
+
+def break_outside(
+    moved: list[float], first: int, start: float, displacement: float, longest_bond: float
+) -> None:
+    """Break the bonds of bins that a displacement [h] takes out of the window, as in ``sweep``.
+
+    Else the last correction of a step would wrap some of them with their bonds.
+    """
+    count = len(moved) - first
+    window = longest_bond - LOW
+    width = window / count
+    offset = LOW + 0.5 * width + start % window
+    for j in range(count):
+        x = offset + j * width
+        if x >= longest_bond:
+            x -= window
+        if not LOW <= x - displacement < longest_bond:
+            moved[first + j] = 0.0

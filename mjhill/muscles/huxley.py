@@ -50,7 +50,7 @@ class Huxley(Bonds):
     )  # fmt: skip
     longest_bond: float = quantity(
         "x_top", "-", "stretch at which all bonds are broken [h]; more where g3 is small",
-        (2, 50), default=3.5, low_allowed=True, array="dynprm",
+        (2, 50), default=5.0, low_allowed=True, array="dynprm",
     )  # fmt: skip
     activation_scales_force: bool = flag(default=False, array="dynprm")
 
