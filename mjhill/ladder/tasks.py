@@ -13,10 +13,15 @@ from mjhill.joints.joint import Joint
 from mjhill.joints.reader import read_joints
 from mjhill.lab.batch import driving_torques, joint_angles
 from mjhill.lab.rig import as_joint, timestep_of
+from mjhill.ladder.exchanged import with_flat_force, with_linear_passive
 
 CONSTANT_VELOCITY = "hill, V_max constant"
 
-RUNGS = ("hill", CONSTANT_VELOCITY, "hill-rigid", "dm", "huxley")
+_EXCHANGED: Mapping[str, Callable[[Joint], Joint]] = MappingProxyType(
+    {"hill-flat-ata": with_flat_force, "hill-linear-pe": with_linear_passive}
+)
+
+RUNGS = ("hill", CONSTANT_VELOCITY, *_EXCHANGED, "hill-rigid", "dm", "huxley")
 """The models of the ladder; of ``hill, V_max constant`` the parameters were fitted anew."""
 
 _BURST, _LONG, _MOVE = 0.05, 1.0, 0.2  # [s]; estimates, ten times shorter in the eye
@@ -52,6 +57,8 @@ def rung(name: str, joint: str | Joint) -> Joint:
     base = as_joint(joint)
     if name == CONSTANT_VELOCITY:
         return read_joints("constant_velocity")[base.name]
+    if name in _EXCHANGED:
+        return _EXCHANGED[name](base)
     return base if name == "hill" else base.with_muscles(name)
 
 
