@@ -30,6 +30,7 @@ from mjhill.muscles.dm import DistributionMoment as DistributionMoment
 from mjhill.muscles.equivalent import anatomical_muscle as anatomical_muscle
 from mjhill.muscles.equivalent import equivalent_muscle as equivalent_muscle
 from mjhill.muscles.hill import Hill as Hill
+from mjhill.muscles.hill_linear import HillLinear as HillLinear
 from mjhill.muscles.hill_rigid import HillRigid as HillRigid
 from mjhill.muscles.huxley import Huxley as Huxley
 from mjhill.simulate import reference as reference

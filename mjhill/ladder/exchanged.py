@@ -1,4 +1,4 @@
-"""Joints of ``hill`` with one of their nonlinearities exchanged for its value at the home angle."""
+"""Joints of ``hill`` with nonlinearities exchanged for what they are at the home angle."""
 
 from __future__ import annotations
 
@@ -62,3 +62,12 @@ def with_linear_passive(joint: Joint) -> Joint:
         rest_angle=home + plant_torque(joint, home) / stiffness,
         passive=replace(joint.passive, k1_pos=0.0, k1_neg=0.0),
     )
+
+
+def with_linear_elements(joint: Joint) -> Joint:
+    """The joint with linear passive torque and muscles of the model ``hill-linear``.
+
+    Raises:
+        ValueError: A muscle cannot be made one of that model.
+    """
+    return with_linear_passive(joint).with_muscles("hill-linear")

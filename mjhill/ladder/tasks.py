@@ -13,12 +13,16 @@ from mjhill.joints.joint import Joint
 from mjhill.joints.reader import read_joints
 from mjhill.lab.batch import driving_torques, joint_angles
 from mjhill.lab.rig import as_joint, timestep_of
-from mjhill.ladder.exchanged import with_flat_force, with_linear_passive
+from mjhill.ladder.exchanged import with_flat_force, with_linear_elements, with_linear_passive
 
 CONSTANT_VELOCITY = "hill, V_max constant"
 
 _EXCHANGED: Mapping[str, Callable[[Joint], Joint]] = MappingProxyType(
-    {"hill-flat-ata": with_flat_force, "hill-linear-pe": with_linear_passive}
+    {
+        "hill-flat-ata": with_flat_force,
+        "hill-linear-pe": with_linear_passive,
+        "hill-linear": with_linear_elements,
+    }
 )
 
 RUNGS = ("hill", CONSTANT_VELOCITY, *_EXCHANGED, "hill-rigid", "dm", "huxley")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mjhill.muscles import dm, hill, hill_rigid, huxley
+from mjhill.muscles import dm, hill, hill_linear, hill_rigid, huxley
 from mjhill.muscles.model import Muscle as Muscle
 from mjhill.muscles.model import MuscleModel as MuscleModel
 from mjhill.muscles.model import OperatingPoint as OperatingPoint
@@ -11,6 +11,7 @@ from mjhill.muscles.parts import Contractile
 MODELS: tuple[MuscleModel, ...] = (
     hill.MODEL,
     hill_rigid.MODEL,
+    hill_linear.MODEL,
     dm.MODEL,
     huxley.MODEL,
 )

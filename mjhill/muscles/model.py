@@ -206,7 +206,8 @@ class MuscleModel:
         bins: The parameter that says how many unnamed states follow; none by default.
         rates: Rates of the states for MuJoCo to advance by a timestep, in the order of ``states``;
             or None, written into ``state_rates``.
-        force: Tension [N·m or N], never negative; may ask for ``<state>_rate``, just written.
+        force: Tension [N·m or N], never negative where ``pulls_only``; may ask for
+            ``<state>_rate``, just written.
         derivatives: True rates of the states, for the reference solver; as ``rates``.
         tension: True tension at a state.
         steady: States at rest for ``u`` and ``length``.
@@ -226,6 +227,7 @@ class MuscleModel:
         fault: What is impossible about states and ``length``, in words, or None.
         viscous_loss: Energy lost inside [J], from what ``series`` gave; see ``nothing_lost``.
         staged: Whether it can follow the stages of RK4; ``check_model`` refuses one that cannot.
+        pulls_only: Whether it never pushes.
         sources: Where its equations come from.
     """
 
@@ -253,6 +255,7 @@ class MuscleModel:
     fault: Equation = no_fault
     viscous_loss: Callable[..., Values] = nothing_lost
     staged: bool = True
+    pulls_only: bool = True
 
     def __post_init__(self) -> None:
         """Check that every equation asks only for what exists.

@@ -119,6 +119,8 @@ def _of_muscle(recording: Recording, name: str, muscle: Muscle) -> Iterator[Tran
         ),
         "push": (force, -force - 1e-9 * muscle.max_isometric_force, np.zeros_like(force)),
     }
+    if not model.pulls_only:
+        del checks["push"]
     jumped = _jumps(recording, name, before, fastest)
     for kind, (values, excess, limits) in checks.items():
         beyond = ~(excess <= 0)  # so also what is not a number
